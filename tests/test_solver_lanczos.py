@@ -11,7 +11,7 @@ from carillon.fem.model import fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
-from solver.correction.correct import correct
+from solver.correction.error_correction import correct
 from solver.correction.lanczos import lanczos
 from solver.correction.starting_block import mixed
 from solver.distribution.local_mesh import distribute
@@ -76,7 +76,9 @@ def test_a_shift_near_an_eigenvalue_does_no_harm(box, distance):
 def test_a_shift_on_an_eigenvalue_is_moved(box, monkeypatch):
     on_it = box.exact[25] * (1.0 + 1e-12)
     assert box.run(on_it, 60, 1e-8).resonant
-    monkeypatch.setattr("solver.correction.iteration.SHIFT_FRACTION", on_it / box.values[59])
+    monkeypatch.setattr(
+        "solver.correction.subspace_iteration.SHIFT_FRACTION", on_it / box.values[59]
+    )
     result = correct(box.system, box.start, 60, box.inner, box.values, tolerance=1e-8)
     assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-8
 
@@ -111,7 +113,7 @@ def test_a_mode_that_the_iteration_misses_is_noticed_and_found(box, monkeypatch)
         return found
 
     start = box.run(0.5 * box.exact[59], 60, 1e-2)
-    monkeypatch.setattr("solver.correction.iteration.lanczos", one_missing)
+    monkeypatch.setattr("solver.correction.subspace_iteration.lanczos", one_missing)
     result = correct(box.system, start.vectors, 60, box.inner, start.values, tolerance=1e-6)
     assert np.abs(result.values / box.exact[:60] - 1.0).max() <= 1e-6
 

@@ -18,7 +18,7 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
 from solver.assembly.system import Layout, assemble
-from solver.correction.correct import correct
+from solver.correction.error_correction import correct
 from solver.distribution.local_mesh import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize

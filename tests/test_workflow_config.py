@@ -184,7 +184,7 @@ LISTS = {
     "grower": "forests.training.structure:GROWERS",
     "transform": "forests.scaling:TRANSFORMS",
     "interface": "solver.hcms.condense:INTERFACES",
-    "acceleration": "solver.correction.correction:ACCELERATIONS",
+    "acceleration": "solver.correction.criteria:ACCELERATIONS",
     "linear_solver": "solver.linear:METHODS",
     "missed_tolerance": "solver.analysis.options:MISSED",
     "rivals": "studies.benchmark.further:RIVALS",

@@ -10,7 +10,7 @@ from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.processes.memory import available_memory
 from solver.analysis.options import SolverOptions
-from solver.correction.correction import FEWEST_GUARDS, default_guard
+from solver.correction.criteria import FEWEST_GUARDS, default_guard
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.reference.truth import SPARE_MODES
 

@@ -15,7 +15,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
-from solver.correction.correction import default_guard
+from solver.correction.criteria import default_guard
 from solver.correction.random_start import Approximation
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import COLUMNS, scatter_rows

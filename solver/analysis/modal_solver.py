@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any, TypeGuard, cast
 
 import numpy as np
@@ -11,50 +12,25 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.command_line.progress import say
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.processes.memory import reuse_freed_memory
 from carillon.processes.threads import limit_threads
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
-from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
+from solver.analysis.corrected import CorrectedModes, Eigenpairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import RANDOM, SolverOptions
 from solver.analysis.prepared import Prepared
-from solver.analysis.proof import completed, ground_truth
-from solver.analysis.timing import Phases, peak_memory
-from solver.assembly.system import Layout, System, assemble
-from solver.correction.correct import correct
-from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
-from solver.correction.random_start import Approximation, Cold, from_nothing
+from solver.analysis.proof import ground_truth, prove
+from solver.analysis.timing import Phases
+from solver.assembly.system import assemble
 from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
-from solver.linear import Inverse, Lasting, LinearSolver
-from solver.reference.truth import SPARE_MODES, Truth, can_count
-from solver.subspace.rayleigh_ritz import rigid_pairs
+from solver.linear import Inverse
 from solver.subspace.weyl import CountingLaw
-from solver.verification.residuals import (
-    require_orthonormal,
-    require_six_rigid,
-    rigid_modes,
-    verify,
-)
 
 Array = NDArray[np.float64]
-
-FEWEST_CORRECTED = 6
-"""Modes that HCMS corrects at least: the first mode of a ball alone, one of five that are all but
-equal, hardly converges."""
-
-
-@dataclass
-class _Solution:
-    """Eigenpairs, and what a warm start makes use of, see `Modes`."""
-
-    values: Array
-    vectors: Array
-    guard: Array | None = None
-    inverse: Lasting | None = None
 
 
 class ModalSolver:
@@ -103,15 +79,9 @@ class ModalSolver:
         verbose: bool = False,
         prepared: Prepared | None = None,
     ) -> None:
-        def checked() -> SolverOptions:
-            n_dofs = cast(Solid, model).n_dofs
-            check_mode_count(options.modes, n_dofs)
-            return options.resolved(n_dofs)
-
-        options = bcast_from_root(comm, checked)
+        options = bcast_from_root(comm, lambda: _with_method(options, model))
         self._model = model if comm.rank == 0 else None
         require_memory(model, options, comm)
-        self.options = options
         self.comm = comm
         self._verbose = verbose
         self._threads = limit_threads(ranks_of_machine(comm))
@@ -121,21 +91,22 @@ class ModalSolver:
         if options.method not in RANDOM or options.linear_solver != "auto":
             prepared = None
         with phases("partition"):
-            subdomains = comm.size if options.method in RANDOM else options.subdomains
             if prepared is None:
+                subdomains = comm.size if options.method in RANDOM else options.subdomains
                 self.local_mesh = distribute(model, subdomains, options.seed, comm)
             else:
                 self.local_mesh = prepared.local_mesh
         with phases("analysis"):
             if prepared is None:
-                self._layout = Layout.of_local_mesh(self.local_mesh, comm)
-                self._linear = LinearSolver(options.linear_solver, self._layout)
-            else:
-                self._layout, self._linear = prepared.layout, prepared.linear
+                prepared = Prepared.of_mesh(self.local_mesh, comm, options.linear_solver)
+            self._layout, self._linear = prepared.layout, prepared.linear
             if options.method == "lanczos" and not self._linear.indefinite:
-                self.options = options = replace(options, method="lobpcg")
-            if options.method == "hcms":
-                self._components = ComponentModes(self.local_mesh, options, self._together, comm)
+                options = replace(options, method="lobpcg")
+            report = _reporter(verbose and comm.rank == 0)
+            self._corrected = CorrectedModes(
+                options, self.local_mesh, self._linear, comm, self._threads, report
+            )
+        self.options = options
         self.seconds = phases.seconds
 
     def solve(
@@ -202,156 +173,64 @@ class ModalSolver:
         poisson: float | None,
         moduli_of: Callable[[Solid, Array], Array],
     ) -> Modes:
-        phases = Phases(self.comm, self._verbose)
+        options, phases = self.options, Phases(self.comm, self._verbose)
         with phases("assembly"):
-            local_mesh = self.local_mesh
-            if self.comm.bcast(young is not None):
-                moduli = compute_on_root(
-                    self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
-                )
-                local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
-            if poisson is not None:
-                local_mesh = with_poisson(local_mesh, poisson)
+            local_mesh = self._with_material(young, poisson, moduli_of)
+            similar = initial_modes if self._is_of_same_mesh(initial_modes) else None
+            like = None if similar is None else similar.system
             elements = local_mesh.cells.elements
-            like = initial_modes.system if self._is_of_same_mesh(initial_modes) else None
             system = assemble(local_mesh, self.comm, self._layout, elements, self._threads, like)
         evidence: dict[str, Any] = {
-            "method": self.options.method,
+            "method": options.method,
             "ranks": self.comm.size,
             "threads": self._threads,
             "subdomains": local_mesh.decomposition.tree.parts,
             "n_dofs": local_mesh.n_dofs,
         }
-        if self.options.is_general:
-            truth = ground_truth(system, self.options, phases, evidence)
-            solution = _Solution(*truth.lowest())
+        if options.is_general:
+            pairs = Eigenpairs(*ground_truth(system, options, phases, evidence).lowest())
         else:
-            solution = self._corrected(local_mesh, system, young, initial_modes, phases, evidence)
-        values, vectors = solution.values, solution.vectors
-        with phases("verification"):
-            residuals, orthogonality = verify(system, values, vectors)
-        evidence["orthogonality"] = orthogonality
-        evidence["residual_max"] = float(residuals.max())
-        evidence["rigid_modes"] = rigid_modes(system, values, vectors)
-        evidence["peak_memory_bytes"] = peak_memory(self.comm)
-        require_orthonormal(orthogonality)
-        if self._exact:
-            require_six_rigid(evidence["rigid_modes"])
+            law = partial(self._law, young)
+            pairs = self._corrected.solve(
+                local_mesh, system, initial_modes, similar is not None, law, phases, evidence
+            )
+        exact = options.is_general or options.is_corrected
+        residuals = prove(system, pairs.values, pairs.vectors, exact, phases, evidence)
         return Modes(
-            values,
-            vectors,
+            pairs.values,
+            pairs.vectors,
             residuals,
             system,
             evidence,
             phases.seconds,
-            solution.guard,
-            solution.inverse,
+            pairs.guard,
+            pairs.inverse,
         )
+
+    def _with_material(
+        self,
+        young: Array | None,
+        poisson: float | None,
+        moduli_of: Callable[[Solid, Array], Array],
+    ) -> LocalMesh:
+        """This rank's part of the solid with another material; collective."""
+        local_mesh = self.local_mesh
+        if self.comm.bcast(young is not None):
+            moduli = compute_on_root(
+                self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
+            )
+            local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
+        return local_mesh if poisson is None else with_poisson(local_mesh, poisson)
 
     def inverse(self, modes: Modes, shift: float) -> Inverse:
         """(K - shift M)^-1 of the material that `modes` belong to, by the correction's solver."""
         return self._linear.inverse(modes.system, shift)
-
-    @property
-    def _exact(self) -> bool:
-        """Whether eigenpairs are asked for, not just approximations of them."""
-        return self.options.is_general or self.options.is_corrected
-
-    @property
-    def _together(self) -> bool:
-        """Whether a block Lanczos iteration corrects all modes together."""
-        return self.options.acceleration == "lanczos" and self._linear.indefinite
 
     def _is_of_same_mesh(self, initial_modes: Initial | None) -> TypeGuard[Modes]:
         """Whether these are modes that this solver found."""
         if not isinstance(initial_modes, Modes):
             return False
         return initial_modes.system.rows.pattern is self._layout.pattern
-
-    def _corrected(
-        self,
-        local_mesh: LocalMesh,
-        system: System,
-        young: Array | None,
-        initial_modes: Initial | None,
-        phases: Phases,
-        evidence: dict[str, Any],
-    ) -> _Solution:
-        options = self.options
-        requested = options.modes - RIGID_MODES
-        if options.check_inertia:
-            requested = min(requested + SPARE_MODES, local_mesh.n_dofs - RIGID_MODES)
-        tolerance = EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance
-        values: Array | None = None
-        similar: Lasting | None = None
-        cold: Cold | None = None
-        near: Approximation | None = None
-        if isinstance(initial_modes, Modes):
-            if self._is_of_same_mesh(initial_modes):
-                similar = initial_modes.inverse
-            start: Array | None = initial_modes.start()
-        elif isinstance(initial_modes, Approximation):
-            near, start = initial_modes, initial_modes.vectors
-        else:
-            start = initial_modes
-        if (start is None and options.method == "lanczos") or (near is not None and self._together):
-            with phases("lanczos"):
-                cold = from_nothing(
-                    system,
-                    self._linear,
-                    requested,
-                    resolved(requested, tolerance),
-                    carried(requested, tolerance),
-                    self._law(young),
-                    tolerance,
-                    options.seed,
-                    near,
-                )
-            values, start = cold.found.values, cold.found.vectors
-        elif start is None and options.method == "hcms":
-            with phases("hcms"):
-                synthesis = self._components.synthesis(local_mesh, self._threads, evidence)
-            if options.corrections == 0:
-                return _Solution(*lowest_pairs(synthesis, options.modes))
-            values, start = elastic_part(system, synthesis)
-            requested = max(requested, min(FEWEST_CORRECTED, start.shape[1]))
-        with phases("correction"):
-            result = correct(
-                system,
-                start,
-                requested,
-                self._linear,
-                values,
-                tolerance,
-                options.corrections,
-                options.acceleration,
-                report=_reporter(self._verbose and self.comm.rank == 0),
-                similar=similar,
-                begun=cold,
-                keep=options.keeps_missed,
-            )
-            cold = start = None  # a factorisation, and a copy of the modes
-            rigid_values, rigid = rigid_pairs(system)
-        reached = float(result.errors[: options.modes - RIGID_MODES].max())
-        evidence |= {
-            "linear_solver": self._linear.method,
-            "corrections": result.steps,
-            "right_hand_sides": result.solves,
-            "eigenvalue_error_estimate": reached,
-        }
-        if options.keeps_missed and reached > tolerance > 0.0:
-            evidence["missed_tolerance"] = tolerance
-        truth = Truth(
-            np.concatenate([rigid_values, result.values]),
-            np.concatenate([rigid, result.vectors], axis=1),
-            options.modes,
-            result.steps,
-        )
-        if options.check_inertia and can_count():
-            count = self._linear.count_below
-            truth = completed(system, truth, options, phases, evidence, count)
-            evidence |= {"further_searches": truth.searches, "modes_added": truth.added}
-        return _Solution(*truth.lowest(), result.guard, result.inverse)
 
     def _law(self, young: Array | None) -> CountingLaw:
         """Where the eigenvalues are expected, on every rank."""
@@ -362,6 +241,12 @@ class ModalSolver:
             return CountingLaw.of_solid(model, moduli, self.options.modes)
 
         return bcast_from_root(self.comm, law)
+
+
+def _with_method(options: SolverOptions, model: Solid | None) -> SolverOptions:
+    n_dofs = cast(Solid, model).n_dofs
+    check_mode_count(options.modes, n_dofs)
+    return options.with_method(n_dofs)
 
 
 def modal_analysis(

@@ -9,7 +9,7 @@ from carillon.errors import UserError
 from carillon.parameters import Check, OneOf, option, parameters
 from carillon.parameters.quantities import Number, NumberOfModes, between
 from solver import linear
-from solver.correction.correction import ACCELERATIONS, EIGENVALUE_TOLERANCE
+from solver.correction.criteria import ACCELERATIONS, EIGENVALUE_TOLERANCE
 from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
 from solver.reference.eigensolver import TYPES
 from solver.reference.truth import RESIDUAL_TOLERANCE
@@ -46,7 +46,7 @@ class SolverOptions:
     """What to compute and how; the defaults suit a model of some ten thousand unknowns.
 
     The interface treatments are told in `solver.hcms.condense`, the linear solvers in
-    `solver.linear.LinearSolver`, the accelerations in `solver.correction.correct`.
+    `solver.linear.LinearSolver`, the accelerations in `solver.correction.error_correction`.
     """
 
     method: Annotated[str, OneOf(*METHODS)] = option(
@@ -119,7 +119,7 @@ class SolverOptions:
         """Whether approximate modes are corrected, and to a tolerance."""
         return self.corrections > 0 and self.tolerance != 0.0
 
-    def resolved(self, n_dofs: int) -> SolverOptions:
+    def with_method(self, n_dofs: int) -> SolverOptions:
         """The same with a method for `auto`: the fastest of those that the other options allow.
 
         Raises

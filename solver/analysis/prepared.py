@@ -21,7 +21,7 @@ class Prepared:
     local_mesh
         This rank's part of the solid, with its material.
     layout, linear
-        Of its matrices, and the solver of linear systems with them.
+        Layout of its matrices, and the solver of linear systems with them.
     """
 
     local_mesh: LocalMesh
@@ -29,9 +29,15 @@ class Prepared:
     linear: LinearSolver
 
     @classmethod
-    def of_model(cls, model: Solid | None, comm: MPI.Comm, linear_solver: str = "auto") -> Prepared:
-        """That of a model, which is None but on rank 0; collective."""
-        local_mesh = distribute(model, comm.size, comm=comm)
+    def of_model(cls, model: Solid | None, comm: MPI.Comm) -> Prepared:
+        """Prepare a model, which is None except on rank 0; collective."""
+        return cls.of_mesh(distribute(model, comm.size, comm=comm), comm)
+
+    @classmethod
+    def of_mesh(
+        cls, local_mesh: LocalMesh, comm: MPI.Comm, linear_solver: str = "auto"
+    ) -> Prepared:
+        """Prepare a mesh that is distributed; collective."""
         layout = Layout.of_local_mesh(local_mesh, comm)
         return cls(local_mesh, layout, LinearSolver(linear_solver, layout))
 

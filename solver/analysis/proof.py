@@ -1,12 +1,15 @@
-"""Ground truth by a general eigensolver, and the count of eigenvalues that tells it complete."""
+"""Ground truth by a general eigensolver, its completion by a count, and the proof of all modes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solver.analysis.options import SolverOptions
-from solver.analysis.timing import Phases
+from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import System
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
@@ -17,6 +20,14 @@ from solver.reference.truth import (
     count_beyond,
     solve_truth,
 )
+from solver.verification.residuals import (
+    require_orthonormal,
+    require_six_rigid,
+    rigid_modes,
+    verify,
+)
+
+Array = NDArray[np.float64]
 
 
 def ground_truth(
@@ -83,3 +94,37 @@ def completed(
             "inertia_expected": inertia.computed,
         }
     return truth
+
+
+def prove(
+    system: System,
+    values: Array,
+    vectors: Array,
+    exact: bool,
+    phases: Phases,
+    evidence: dict[str, Any],
+) -> Array:
+    """Residual ratios (k,) of eigenpairs, whose properties go into `evidence`; collective.
+
+    Parameters
+    ----------
+    exact
+        Whether they shall be eigenpairs, not just approximations of some.
+
+    Raises
+    ------
+    ConvergenceError
+        If the modes are not orthonormal, or exact ones do not have six rigid motions.
+    """
+    with phases("verification"):
+        residuals, orthogonality = verify(system, values, vectors)
+    evidence |= {
+        "orthogonality": orthogonality,
+        "residual_max": float(residuals.max()),
+        "rigid_modes": rigid_modes(system, values, vectors),
+        "peak_memory_bytes": peak_memory(system.comm),
+    }
+    require_orthonormal(orthogonality)
+    if exact:
+        require_six_rigid(evidence["rigid_modes"])
+    return residuals

@@ -13,7 +13,7 @@ from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import Tolerance
 from carillon.records.provenance import record
 from solver.commands.running import on_ranks, parameters, require_outputs, write_json
-from solver.correction.correction import EIGENVALUE_TOLERANCE
+from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.verification.audit import audit_files
 
 EXAMPLES = """example:

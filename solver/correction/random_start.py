@@ -62,7 +62,7 @@ def from_nothing(
     system: System,
     linear: LinearSolver,
     requested: int,
-    resolved: int,
+    accurate: int,
     width: int,
     law: CountingLaw,
     tolerance: float,
@@ -73,8 +73,8 @@ def from_nothing(
 
     Parameters
     ----------
-    requested, resolved, width
-        Modes wanted, to become accurate, and to return.
+    requested, accurate, width
+        Number of modes requested, of those to become accurate, and of those to return.
     law
         Where eigenvalues are expected, for the shift.
     tolerance
@@ -118,7 +118,7 @@ def from_nothing(
                 tolerance,
                 columns,
             )
-        found = lanczos(system, inverse, start, resolved, width, tolerance, look, seed + 1)
+        found = lanczos(system, inverse, start, accurate, width, tolerance, look, seed + 1)
         if found.too_high and attempt < ATTEMPTS - 1:
             last = float(found.values[requested - 1])
         elif not found.resonant:

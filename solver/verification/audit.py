@@ -9,7 +9,7 @@ from typing import Any
 
 from carillon.errors import UserError
 from carillon.files.atomic import by_stem
-from solver.correction.correction import EIGENVALUE_TOLERANCE
+from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.files.modes_file import ModesFile, read_modes
 from solver.verification.evidence import ModesEvidence, measure_evidence
 from solver.verification.faults import faults

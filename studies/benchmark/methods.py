@@ -16,7 +16,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
-from solver.correction.correction import INTERACTIVE_TOLERANCE
+from solver.correction.criteria import INTERACTIVE_TOLERANCE
 from solver.distribution.collective import compute_on_root
 from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import CHECKS

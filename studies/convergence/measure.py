@@ -16,8 +16,8 @@ from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
-from solver.correction.correct import correct
-from solver.correction.correction import STEPWISE
+from solver.correction.criteria import STEPWISE
+from solver.correction.error_correction import correct
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.files.modes_file import read_modes

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from solver.correction.correction import ACCELERATIONS
+from solver.correction.criteria import ACCELERATIONS
 from solver.hcms.condense import INTERFACES
 from studies.convergence.measure import STARTS, STEPWISE
 

@@ -26,7 +26,7 @@ from carillon.processes.threads import in_parallel, split
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System
-from solver.correction.correction import EIGENVALUE_TOLERANCE, carried, resolved
+from solver.correction.criteria import EIGENVALUE_TOLERANCE, accurate_count, carried_count
 from solver.correction.krylov import KrylovBasis
 from solver.correction.random_start import from_nothing
 from solver.linear import Inverse, LinearSolver
@@ -187,8 +187,8 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> Profile:
     threads = system.rows.threads
     wanted = options.modes - RIGID_MODES
     law = CountingLaw.of_solid(model, model.young, options.modes)
-    width = carried(wanted, EIGENVALUE_TOLERANCE)
-    accurate = resolved(wanted, EIGENVALUE_TOLERANCE)
+    width = carried_count(wanted, EIGENVALUE_TOLERANCE)
+    accurate = accurate_count(wanted, EIGENVALUE_TOLERANCE)
     cold = from_nothing(system, linear, wanted, accurate, width, law, EIGENVALUE_TOLERANCE, seed)
     found, shift = cold.found, cold.inverse.shift
     cold.inverse.destroy()

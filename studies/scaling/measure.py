@@ -19,8 +19,8 @@ from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.components import elastic_part
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
-from solver.correction.correct import correct
-from solver.correction.correction import default_guard
+from solver.correction.criteria import default_guard
+from solver.correction.error_correction import correct
 from solver.distribution.collective import bcast_from_root
 from solver.distribution.local_mesh import distribute
 from solver.hcms.counts import Tally

@@ -13,7 +13,7 @@ from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import NumberOfModes, Tolerance, between
 from solver import linear
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.correction.correction import INTERACTIVE_TOLERANCE
+from solver.correction.criteria import INTERACTIVE_TOLERANCE
 from solver.distribution.decomposition import decompose
 from solver.distribution.tree import MergeTree
 from studies.scaling.launch import MOST_RANKS, measure_each, require_ranks

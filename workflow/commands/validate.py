@@ -25,7 +25,7 @@ from carillon.parameters.quantities import NonNegative, Point, Positive, Workers
 from carillon.processes.threads import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
-from solver.correction.correction import EIGENVALUE_TOLERANCE
+from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
 from studies.base.table import read_table
 from workflow.configuration.run import TolerancesSection

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.correction import EIGENVALUE_TOLERANCE, Correction, default_guard
+from solver.correction.criteria import EIGENVALUE_TOLERANCE, default_guard
 from solver.correction.enrichment import Ritz
-from solver.correction.iteration import Iteration
 from solver.correction.lobpcg import lobpcg
 from solver.correction.random_start import Cold
+from solver.correction.result import Correction
+from solver.correction.subspace_iteration import SubspaceIteration
 from solver.linear import Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.start import every_unknown, start_block
@@ -116,7 +117,7 @@ def correct(
     if len(values) == system.n_dofs - system.rigid.shape[1]:
         return _whole(values, start, requested)
     ritz = Ritz(system, values, start)
-    iteration = Iteration(system, linear, ritz, requested, acceleration, similar)
+    iteration = SubspaceIteration(system, linear, ritz, requested, acceleration, similar)
     if begun is not None:
         iteration.go_on_from(begun)
     try:

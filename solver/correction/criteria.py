@@ -1,15 +1,4 @@
-"""What an error correction is asked for, and what comes of it."""
-
-from __future__ import annotations
-
-from dataclasses import dataclass, field
-
-import numpy as np
-from numpy.typing import NDArray
-
-from solver.linear import Lasting
-
-Array = NDArray[np.float64]
+"""How accurate corrected modes become, and how many vectors are carried for that."""
 
 EIGENVALUE_TOLERANCE = 1e-7
 """Relative eigenvalue error that a correction stops at unless told otherwise."""
@@ -26,48 +15,13 @@ IMPROVED_GUARDS = 0.4
 """Share of the guard vectors that are improved too, for the sake of the last wanted modes."""
 
 
-@dataclass
-class Correction:
-    """Corrected eigenpairs of the elastic modes.
-
-    Attributes
-    ----------
-    values
-        (k,) Ritz values [rad^2/s^2], ascending.
-    vectors
-        (local, k) mass-orthonormal, orthogonal to the rigid motions, row-major.
-    errors
-        (k,) estimated relative error of each value, from its residual.
-    guard
-        (local, g) what the iteration carried beyond; useful to start again from.
-    steps
-        Number of corrections made.
-    solves, blocks
-        Number of right-hand sides solved, and of the blocks that they came in.
-    history
-        Largest estimated error before each step, and at the end.
-    inverse
-        Inverse for this material that a similar one may start with; None if there is none to keep.
-    """
-
-    values: Array
-    vectors: Array
-    errors: Array
-    guard: Array
-    steps: int = 0
-    solves: int = 0
-    blocks: int = 0
-    history: list[float] = field(default_factory=list)
-    inverse: Lasting | None = None
-
-
-def carried(requested: int, tolerance: float) -> int:
+def carried_count(requested: int, tolerance: float) -> int:
     """Vectors that a block Lanczos iteration is to return: the wanted ones and those beyond."""
     guard = default_guard(requested)
     return requested + (guard if tolerance >= LOOSE else int(IMPROVED_GUARDS * guard) + 1)
 
 
-def resolved(requested: int, tolerance: float) -> int:
+def accurate_count(requested: int, tolerance: float) -> int:
     """Modes that a first iteration has to find accurately.
 
     Those beyond decide how fast the modes of a similar material follow, which only a loose

@@ -9,17 +9,12 @@ from numpy.typing import NDArray
 
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.correction import (
-    IMPROVED_GUARDS,
-    LOOSE,
-    Correction,
-    carried,
-    default_guard,
-)
+from solver.correction.criteria import IMPROVED_GUARDS, LOOSE, carried_count, default_guard
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.krylov import ZERO_FRACTION
 from solver.correction.lanczos import is_too_high, lanczos
 from solver.correction.random_start import Cold
+from solver.correction.result import Correction
 from solver.correction.starting_block import mixed
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, Lasting, LinearSolver
@@ -49,7 +44,7 @@ ROUGH_MASS = 0.5
 """Consistent mass of a rough residual, as a share of what the row sums make of it."""
 
 
-class Iteration:
+class SubspaceIteration:
     """State of the subspace iteration."""
 
     def __init__(
@@ -97,7 +92,7 @@ class Iteration:
     ) -> Correction:
         """Correct until the tolerance, or the last step allowed, is reached.
 
-        See `solver.correction.correct.correct`, also for what is raised.
+        See `solver.correction.error_correction.correct`, also for what is raised.
         """
         step = self.steps
         if tolerance >= LOOSE:
@@ -160,7 +155,7 @@ class Iteration:
         )
 
     def _run_lanczos(self, tolerance: float, observe: Callable[[int, Array], None] | None) -> None:
-        width = carried(self.requested, tolerance)
+        width = carried_count(self.requested, tolerance)
         # Again where a poor start has put the shift too high, or chance on an eigenvalue; a start
         # that knows nothing of the spectrum needs one from below.
         for run in range(LANCZOS_RUNS):

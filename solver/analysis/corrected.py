@@ -1,0 +1,200 @@
+"""Corrected modes: from random vectors, HCMS, or the modes of a similar or a coarser solid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from carillon.fem.model import RIGID_MODES
+from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
+from solver.analysis.modes import Initial, Modes
+from solver.analysis.options import SolverOptions
+from solver.analysis.proof import completed
+from solver.analysis.timing import Phases
+from solver.assembly.system import System
+from solver.correction.criteria import EIGENVALUE_TOLERANCE, accurate_count, carried_count
+from solver.correction.error_correction import correct
+from solver.correction.random_start import Approximation, Cold, from_nothing
+from solver.distribution.local_mesh import LocalMesh
+from solver.linear import Lasting, LinearSolver
+from solver.reference.truth import SPARE_MODES, Truth, can_count
+from solver.subspace.rayleigh_ritz import rigid_pairs
+from solver.subspace.weyl import CountingLaw
+
+Array = NDArray[np.float64]
+
+FEWEST_CORRECTED = 6
+"""Modes that HCMS corrects at least: the first mode of a ball alone, one of five that are all but
+equal, hardly converges."""
+
+
+@dataclass
+class Eigenpairs:
+    """Eigenpairs, rigid ones included, and what a warm start makes use of, see `Modes`."""
+
+    values: Array
+    vectors: Array
+    guard: Array | None = None
+    inverse: Lasting | None = None
+
+
+@dataclass
+class _Start:
+    """What a correction begins with, see `solver.correction.error_correction.correct`."""
+
+    values: Array | None
+    vectors: Array | None
+    similar: Lasting | None = None
+    begun: Cold | None = None
+
+
+class CorrectedModes:
+    """Corrected modes of one mesh, for any material on it.
+
+    Parameters
+    ----------
+    options
+        What to compute and how, the method being one of those that correct.
+    local_mesh
+        This rank's part of the mesh.
+    linear
+        Solver of linear systems with its matrices.
+    threads
+        Threads of this rank.
+    report
+        Called on each rank with the step and the largest estimated error.
+    """
+
+    def __init__(
+        self,
+        options: SolverOptions,
+        local_mesh: LocalMesh,
+        linear: LinearSolver,
+        comm: MPI.Comm,
+        threads: int,
+        report: Callable[[int, float], None] | None,
+    ) -> None:
+        self._options = options
+        self._linear = linear
+        self._threads = threads
+        self._report = report
+        self._components: ComponentModes | None = None
+        if options.method == "hcms":
+            self._components = ComponentModes(local_mesh, options, self._together, comm)
+
+    @property
+    def _together(self) -> bool:
+        """Whether a block Lanczos iteration corrects all modes together."""
+        return self._options.acceleration == "lanczos" and self._linear.indefinite
+
+    def solve(
+        self,
+        local_mesh: LocalMesh,
+        system: System,
+        initial: Initial | None,
+        same_mesh: bool,
+        law: Callable[[], CountingLaw],
+        phases: Phases,
+        evidence: dict[str, Any],
+    ) -> Eigenpairs:
+        """Modes of a material; collective.
+
+        Parameters
+        ----------
+        local_mesh, system
+            This rank's part of the solid with its material, and its matrices.
+        initial, same_mesh
+            What to start from, and whether these are modes that were found on this mesh.
+        law
+            Tells where the eigenvalues are expected.
+        phases, evidence
+            Get the seconds, and what was achieved.
+        """
+        options, tolerance = self._options, self._options.tolerance
+        tolerance = EIGENVALUE_TOLERANCE if tolerance is None else tolerance
+        requested = options.modes - RIGID_MODES
+        if options.check_inertia:
+            requested = min(requested + SPARE_MODES, local_mesh.n_dofs - RIGID_MODES)
+        near = initial if isinstance(initial, Approximation) else None
+        if (initial is None and options.method == "lanczos") or (near and self._together):
+            with phases("lanczos"):
+                start = self._from_nothing(system, requested, tolerance, law(), near)
+        elif initial is None and self._components is not None:
+            with phases("hcms"):
+                synthesis = self._components.synthesis(local_mesh, self._threads, evidence)
+            if options.corrections == 0:
+                return Eigenpairs(*lowest_pairs(synthesis, options.modes))
+            values, vectors = elastic_part(system, synthesis)
+            start = _Start(values, vectors)
+            requested = max(requested, min(FEWEST_CORRECTED, vectors.shape[1]))
+        else:
+            start = _given(initial, same_mesh)
+        with phases("correction"):
+            result = correct(
+                system,
+                start.vectors,
+                requested,
+                self._linear,
+                start.values,
+                tolerance,
+                options.corrections,
+                options.acceleration,
+                report=self._report,
+                similar=start.similar,
+                begun=start.begun,
+                keep=options.keeps_missed,
+            )
+            del start  # a factorisation, and a copy of the modes
+            rigid_values, rigid = rigid_pairs(system)
+        reached = float(result.errors[: options.modes - RIGID_MODES].max())
+        evidence |= {
+            "linear_solver": self._linear.method,
+            "corrections": result.steps,
+            "right_hand_sides": result.solves,
+            "eigenvalue_error_estimate": reached,
+        }
+        if options.keeps_missed and reached > tolerance > 0.0:
+            evidence["missed_tolerance"] = tolerance
+        truth = Truth(
+            np.concatenate([rigid_values, result.values]),
+            np.concatenate([rigid, result.vectors], axis=1),
+            options.modes,
+            result.steps,
+        )
+        if options.check_inertia and can_count():
+            count = self._linear.count_below
+            truth = completed(system, truth, options, phases, evidence, count)
+            evidence |= {"further_searches": truth.searches, "modes_added": truth.added}
+        return Eigenpairs(*truth.lowest(), result.guard, result.inverse)
+
+    def _from_nothing(
+        self,
+        system: System,
+        requested: int,
+        tolerance: float,
+        law: CountingLaw,
+        near: Approximation | None,
+    ) -> _Start:
+        cold = from_nothing(
+            system,
+            self._linear,
+            requested,
+            accurate_count(requested, tolerance),
+            carried_count(requested, tolerance),
+            law,
+            tolerance,
+            self._options.seed,
+            near,
+        )
+        return _Start(cold.found.values, cold.found.vectors, begun=cold)
+
+
+def _given(initial: Initial | None, same_mesh: bool) -> _Start:
+    if isinstance(initial, Modes):
+        return _Start(None, initial.start(), initial.inverse if same_mesh else None)
+    return _Start(None, initial.vectors if isinstance(initial, Approximation) else initial)
