@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.model import RIGID_MODES, fine_model
 from solver.analysis.library import solve
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, radiated
 from sound.scenes.shape import Shape
 from sound.surface import struck_surface

@@ -21,7 +21,7 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES
 from solver.refinement.options import ALLOWED_DISTANCE
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from solver.verification.comparison import compare_files
 from studies.accuracy import domains
 from studies.accuracy.ritz import free_eigenvalues

@@ -38,7 +38,7 @@ from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES, restrict_stiffness
 from solver.hcms.synthesis import synthesize
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from solver.verification.comparison import compare_files, on_mesh_of
 from tests import solids
 from tests.edited_files import edited

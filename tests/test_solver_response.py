@@ -18,12 +18,8 @@ from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
 from solver.coarsening.model import coarse_model
 from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
-from solver.response.contact import (
-    Contact,
-    choose_contacts,
-    embedding,
-    interpolation,
-)
+from solver.response.contact import Contact, choose_contacts
+from solver.response.points import embedding, interpolation
 from solver.response.response import (
     SAMPLE_RATE_HERTZ,
     Contacts,

@@ -21,7 +21,7 @@ from carillon.fem.rigid import mass_properties
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from solver.verification.audit import audit
 from solver.verification.comparison import compare_files
 from sound.__main__ import main

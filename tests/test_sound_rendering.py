@@ -17,7 +17,7 @@ from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
 from solver import solve
 from solver.files.modes_file import read_modes, write_modes
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from solver.response.response import Damping
 from sound.__main__ import main
 from sound.clips.noise import noise_part

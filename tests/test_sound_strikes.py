@@ -8,7 +8,8 @@ import trimesh
 
 from carillon.errors import UserError
 from carillon.fem.geometry import BUILTINS, builtin_surface
-from sound.strikes import Place, inward_normals, locate, locate_all
+from solver.response.vertices import inward_normals
+from sound.strikes import Place, locate, locate_all
 from sound.surface import struck_surface
 
 PAN = "builtin:frying-pan"

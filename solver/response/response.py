@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile
-from solver.response.contact import Contact, interpolation
+from solver.response.contact import Contact
+from solver.response.points import motion_at
 
 Array = NDArray[np.float64]
 
@@ -74,9 +75,8 @@ def at_contacts(file: ModesFile, contacts: list[Contact]) -> Contacts:
     The mesh may be another one than that which the points were chosen on.
     """
     assert file.modes is not None
-    values = interpolation(file.model, np.array([contact.position for contact in contacts]))
-    elastic = file.modes[:, RIGID_MODES:]
-    motion = (values @ elastic.reshape(file.mesh.n_nodes, -1)).reshape(len(contacts), 3, -1)
+    positions = np.array([contact.position for contact in contacts])
+    motion = motion_at(file.model, file.modes[:, RIGID_MODES:], positions)
     inward = np.array([contact.inward for contact in contacts])
     push = np.einsum("pik,pi->pk", motion, inward)
     return Contacts(file.eigenvalues[RIGID_MODES:], motion, push)

@@ -16,7 +16,7 @@ from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.files.atomic import by_stem
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from solver.subspace.spectrum import clusters
 from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
 from solver.verification.matching import (

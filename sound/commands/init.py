@@ -95,8 +95,8 @@ def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
     """A target for each clip, far from each other on the surface."""
     import numpy as np
 
+    from solver.response.vertices import spread
     from sound.clips.files import clip_names
-    from sound.strikes import spread
     from sound.surface import longest_side, struck_surface
 
     surface = struck_surface(mesh)

@@ -17,7 +17,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.files.modes_file import frequencies
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from sound.design.descent import cost_of
 from sound.design.objective import DesignCost
 from sound.design.simulation import Evaluation, Simulation

@@ -20,7 +20,7 @@ from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.linear import Inverse, Lasting
-from solver.response.contact import interpolation
+from solver.response.points import forces_at
 from sound.design.elements import analysed_elements
 from sound.design.material import ReducedMaterial
 from sound.design.modal_truncation import lies_between, outside_response, shift_between
@@ -249,6 +249,6 @@ class Simulation:
 
 def pushes(model: Solid, strikes: Sequence[Strike]) -> Array:
     """Forces (n_dofs, T) of unit impulses [N s] along the inward normals of struck points."""
-    weights = interpolation(model, np.array([strike.position for strike in strikes])).toarray()
+    positions = np.array([strike.position for strike in strikes])
     inward = np.array([strike.inward for strike in strikes])
-    return np.asarray((weights[:, :, None] * inward[:, None, :]).reshape(len(strikes), -1).T)
+    return forces_at(model, positions, inward)

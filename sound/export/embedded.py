@@ -11,7 +11,7 @@ from carillon.fem.model import ElasticModel
 from solver.assembly.sparse import assembled
 from solver.files.model_group import FINITE_CELLS, put
 from solver.files.modes_file import write_modes
-from solver.response.contact import embedding
+from solver.response.points import embedding
 from solver.verification.residuals import recomputed_residuals
 from sound.project.design import Design
 from sound.project.design_file import put_object

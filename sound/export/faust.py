@@ -120,7 +120,7 @@ def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array
     """Names, positions (p, 3) and inward normals (p, 3) of the targets and of other points."""
     import trimesh
 
-    from sound.strikes import inward_normals, spread
+    from solver.response.vertices import inward_normals, spread
 
     strikes = design.strikes
     positions = np.array([strike.position for strike in strikes])

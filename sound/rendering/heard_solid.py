@@ -124,7 +124,8 @@ def _places_of_design(design: Design) -> Places:
     def places(points: Iterable[tuple[str, Point]]) -> list[tuple[Array, Array, float]]:
         import trimesh
 
-        from sound.strikes import Place, inward_normals, vertex_of
+        from solver.response.vertices import inward_normals
+        from sound.strikes import Place, vertex_of
 
         surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
         found: list[tuple[Array, Array, float] | None] = []

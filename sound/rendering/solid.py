@@ -11,7 +11,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import RIGID_MODES, Solid
 from solver.files.modes_file import ModesFile
-from solver.response.contact import interpolation
+from solver.response.points import motion_at
 from solver.response.response import Damping
 from solver.subspace.spectrum import clusters
 from sound.project.design import Design
@@ -105,9 +105,7 @@ class SoundingSolid:
 
     def motion(self, positions: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] of points (p, 3) [m] of the surface in each mode."""
-        values = interpolation(self.model, positions)
-        modes = self.modes.reshape(self.model.mesh.n_nodes, -1)
-        return np.asarray(values @ modes).reshape(len(positions), 3, -1)
+        return motion_at(self.model, self.modes, positions)
 
     def amplitudes(self, positions: Array, impulses: Array) -> Array:
         """Amplitudes a_k (p, k) [kg^-1/2 N s] after impulses (p, 3) [N s] at points (p, 3) [m].

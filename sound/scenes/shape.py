@@ -42,7 +42,7 @@ class Shape:
         """The shape of a surface about a centre (3,) [m]; `radius` [m] is that of a ball."""
         import trimesh
 
-        from sound.strikes import inward_normals
+        from solver.response.vertices import inward_normals
 
         surface = trimesh.Trimesh(vertices, faces, process=False)
         inward = inward_normals(surface, vertices)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from carillon.drawing.solid import Skin
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import Solid
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 
 LONGEST = 2.0
 """Spacings that an edge of a drawn triangle may measure."""

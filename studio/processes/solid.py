@@ -18,8 +18,9 @@ from carillon.processes.threads import one_thread
 from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
 from solver.files.modes_file import frequencies
-from solver.response.contact import interpolation
+from solver.response.points import interpolation
 from solver.response.response import Damping
+from solver.response.vertices import inward_normals
 from sound.design.cents import common_factor
 from sound.design.descent import cost_of
 from sound.design.fine_check import FINE_TOLERANCE
@@ -37,7 +38,7 @@ from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
-from sound.strikes import Place, Strike, inward_normals, locate_all
+from sound.strikes import Place, Strike, locate_all
 from sound.surface import longest_side, struck_surface
 from studio.binary import pack
 from studio.processes.bank import Aim, Heard, bank

@@ -103,7 +103,7 @@ def _gains(design: Design, solid: SoundingSolid, listening: Listening) -> Array:
     """What 1 N s inwards at each vertex lets the modes sound with (V, N) [full scale]."""
     import trimesh
 
-    from sound.strikes import inward_normals
+    from solver.response.vertices import inward_normals
 
     surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
     positions = design.surface_vertices
