@@ -81,7 +81,7 @@ ARROWS = {
         solver.distribution solver.files solver.linear solver.refinement solver.response
         solver.verification""",
     #
-    "sound": "",
+    "sound": "solver.response",
     "sound.synthesis": "solver.response",
     "sound.clips": "sound sound.synthesis",
     "sound.project": "solver.analysis solver.coarsening solver.files sound sound.clips",
@@ -93,7 +93,7 @@ ARROWS = {
         solver.response sound sound.project sound.rendering""",
     "sound.scenes.film": "sound sound.scenes",
     "sound.scenes.contact": "sound.scenes",
-    "sound.export": """solver.assembly solver.files solver.response solver.verification sound
+    "sound.export": """solver.assembly solver.files solver.response solver.verification
         sound.project sound.rendering sound.scenes""",
     "sound.scenes.audible": "sound.rendering sound.scenes sound.scenes.contact sound.synthesis",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export
@@ -103,7 +103,7 @@ ARROWS = {
     #
     "studio": "",
     "studio.server": "sound.project studio",
-    "studio.standalone": "sound sound.design sound.project sound.rendering studio",
+    "studio.standalone": "solver.response sound.design sound.project sound.rendering studio",
     "studio.scene": "solver.refinement sound.scenes studio studio.standalone",
     "studio.processes": """solver.analysis solver.files solver.response sound sound.clips
         sound.design sound.export sound.project sound.rendering studio studio.standalone""",
