@@ -32,14 +32,14 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 EDGES: Index = np.flatnonzero((NODES == 1).sum(axis=1) == 1)
-"""(12,) nodes in the middles of a cell's edges."""
+"""Numbers (12,) of the nodes in the middles of a cell's edges."""
 STEPS = 8
-"""Steps of conjugate gradients; each comes nearer to the surplus, from below."""
+"""Steps of conjugate gradients. Each comes nearer to the surplus, from below."""
 CHUNK = 256
-"""Cells whose matrices are made at once."""
+"""Number of cells whose matrices are made at once."""
 LEAST_INSIDE = 0.005
-"""Share of a cell that has to be inside for its points to tell forces on cubic functions, which are
-of a higher degree than they integrate exactly."""
+"""Least share of a cell inside the solid from which cubic functions get forces in it. They are of a
+higher degree than the cell's points integrate exactly."""
 FLOOR = 1e-6
 """Stiffness of a function, relative to that in a cell that is all inside, below which it is left
 out: hardly any of it is inside."""

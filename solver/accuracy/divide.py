@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 REMAINING = 0.7
-"""Share of the allowed error that cells are divided for."""
+"""Share of the allowed error at which the division of cells aims."""
 MOST_DIVIDED = 0.15
-"""Share of the cells up to which dividing some is worth more than a finer lattice."""
+"""Largest share of the cells that is divided. Beyond it a finer lattice is worth more."""
 MOST_STEPS = 3
-"""Times that cells are divided at most."""
+"""Largest number of rounds in which cells are divided."""
 
 
 class DividedCells:

@@ -26,7 +26,7 @@ SLOWEST, FASTEST = 2.0, 16.0
 """Bounds of the factor by which halved cells diminish an error: that of cracks, and of smooth
 displacements."""
 MOST_LOST = 0.9
-"""Share of an eigenvalue that what was left out may take from it, at most."""
+"""Largest share of an eigenvalue that functions left out may take from it."""
 
 
 @dataclass(frozen=True)

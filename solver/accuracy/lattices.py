@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
 
 WHOLE = 4
-"""Voxels along the edge of a cell at half the resolution."""
+"""Number of voxels along the edge of a finite cell at half the resolution."""
 
 
 def voxel_lattice(surface: trimesh.Trimesh, resolution: int) -> Grid:

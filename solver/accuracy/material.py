@@ -16,11 +16,11 @@ from carillon.fem.geometry.grid import Grid
 Array = NDArray[np.float64]
 
 INTERPOLATED = ("uniform", "smooth")
-"""Materials that vary gradually; of the others each voxel has a modulus of its own."""
+"""Materials that vary gradually. In the others each voxel has a modulus of its own."""
 ARITHMETIC, HARMONIC = 1.0, -1.0
-"""Powers of means."""
+"""Powers of the arithmetic and of the harmonic mean."""
 NOISY = ("random", "noise")
-"""Those whose moduli jump from voxel to voxel."""
+"""Materials whose moduli jump from voxel to voxel."""
 
 
 @dataclass(frozen=True)

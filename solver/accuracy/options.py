@@ -11,7 +11,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 
 FIRST_RESOLUTION = 16
-"""Resolution to begin with in search of one that is accurate enough."""
+"""First resolution of a search for an accurate one."""
 
 
 @parameters

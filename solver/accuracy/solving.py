@@ -34,7 +34,7 @@ from solver.refinement.refine import (
 from solver.refinement.refined_model import RefinedModel
 
 MOST_UNKNOWNS = 400_000
-"""Unknowns from which no finer lattice is tried."""
+"""Largest number of unknowns of a lattice that is tried."""
 UNTOLD = "how far frequencies are from the solid's cannot be told"
 """Warning where the estimate fails."""
 LEAST_STEP, LARGEST_STEP = 1.2, 2.0

@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CHUNK = 256
-"""Cells whose matrices are held at once, about."""
+"""Approximate number of cells whose matrices are held at once."""
 SHIFT = 1e-11
-"""Of the larger cells' stiffness, relative to its trace, which makes it regular."""
+"""Shift that makes the stiffness of a larger cell regular, relative to its trace."""
 
 
 def energy_lost(

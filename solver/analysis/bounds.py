@@ -15,14 +15,16 @@ from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.reference.truth import SPARE_MODES
 
 FEWEST_SPARE = SPARE_MODES
-"""Vectors that the correction needs beyond the modes asked for, to tell the last from the rest."""
+"""Number of vectors beyond the requested modes that tell the last of these from the rest."""
 KEPT_FRACTION, TOGETHER_FRACTION = 1.6, 1.17
-"""Modes kept at the root of the merge tree, as a share of those asked for, and where a block
-Lanczos iteration corrects them together."""
+"""Modes kept at the root of the merge tree as a multiple of those requested: in general, and where
+a block Lanczos iteration corrects them together."""
 FEW_PARTS = 16
-"""Subdomains up to which these shares hold; the best ones grow about like the cube root of more."""
+"""Largest number of subdomains for which these multiples hold. Beyond it the best ones grow about
+like the cube root of the number."""
 FEWEST_BLOCKS, FEWEST_SQUARES = 2, 2
-"""Blocks of all vectors, and matrices of their products, that any method keeps at a time."""
+"""Least number of blocks of all vectors, and of matrices of their products, that any method keeps
+at a time."""
 
 
 @on_all_ranks()

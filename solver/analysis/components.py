@@ -19,7 +19,7 @@ from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 Array = NDArray[np.float64]
 
 ORTHOGONAL_TO_RIGID = 1e-10
-"""Largest overlap of HCMS modes with the rigid motions that needs no correction."""
+"""Largest overlap of HCMS modes with the rigid motions that is not removed."""
 
 
 class ComponentModes:

@@ -29,8 +29,8 @@ from solver.subspace.weyl import CountingLaw
 Array = NDArray[np.float64]
 
 FEWEST_CORRECTED = 6
-"""Modes that HCMS corrects at least: the first mode of a ball alone, one of five that are all but
-equal, hardly converges."""
+"""Least number of modes that are corrected after HCMS. The first mode of a ball alone, one of five
+nearly equal ones, hardly converges."""
 
 
 @dataclass

@@ -62,4 +62,4 @@ class Modes:
 
 
 Initial = Modes | Approximation | Array
-"""What an analysis may start from."""
+"""Modes that an analysis may start from."""

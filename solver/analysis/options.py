@@ -19,9 +19,9 @@ RANDOM = ("lanczos", "lobpcg")
 """Methods that begin with random vectors."""
 MAX_CORRECTIONS = 40
 MISSED = ("fail", "keep")
-"""What may come of a correction that misses its tolerance."""
+"""Consequences of a correction that misses its tolerance."""
 LEAST_UNKNOWNS = 4
-"""Unknowns to each mode from which on the modes are few of all there are."""
+"""Least number of unknowns for each mode at which `auto` starts from random vectors."""
 
 LEAST_TOLERANCE = 1e-15
 """Smallest relative tolerance that double precision can reach."""

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 ENTRIES_AT_ONCE = 4096 * 576
-"""Entries of the element matrices that exist together while K is assembled."""
+"""Number of entries of element matrices that exist at once while K is assembled."""
 _HALO = 21
 
 

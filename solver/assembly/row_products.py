@@ -25,10 +25,10 @@ Index = NDArray[np.int64]
 compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 
 STRIPS = (8, 4, 3, 2, 1)
-"""Registers to a strip of columns."""
+"""Widths of a strip of columns, in registers."""
 ROWS_NEAR = 128
-"""Rows that are gone through for some of the columns before the next columns are, so that what they
-share with each other stays near."""
+"""Number of rows that are gone through for some of the columns before the next columns, so that
+what these rows share stays in the cache."""
 
 
 def multiply(

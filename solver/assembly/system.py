@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)
 
 COLUMNS_GATHERED = 16
-"""Columns that travel to rank 0 together where a block of vectors is gathered or written."""
+"""Number of columns that travel to rank 0 together where a block is gathered or written."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataset_gen import objectives
 from solver.coarsening.coarsening import Array, Coarsening
 
 FIT = "fit"
-"""What coarsening by fits is called."""
+"""Name of coarsening by fits."""
 
 
 class FitCoarsening(Coarsening):

@@ -12,7 +12,7 @@ from forests import default as default_forests
 from solver.coarsening.coarsening import Array, Coarsening
 
 FOREST = "ddfem"
-"""What coarsening by forests is called."""
+"""Name of coarsening by forests."""
 
 DEFAULT = "default"
 """Name of the forests that come with the package."""

@@ -8,7 +8,7 @@ from forests.baselines import average, galerkin
 from solver.coarsening.coarsening import Array, Coarsening
 
 LINEAR = {"average": average, "galerkin": galerkin}
-"""Their moduli by name."""
+"""Functions that give the moduli of linear coarsenings, by name."""
 
 
 class LinearCoarsening(Coarsening):

@@ -12,7 +12,7 @@ from solver.distribution.collective import bcast_from_root
 from solver.verification.comparison import compare_each
 
 OTHER_SHAPE = 0.5
-"""Angle [rad] between modes from which they are not the same."""
+"""Angle [rad] from which two modes are different ones."""
 
 EXAMPLES = """examples:
   compare bunny.h5 truth.h5

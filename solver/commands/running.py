@@ -21,9 +21,9 @@ from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.linear import petsc_options
 
 INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
-"""Arguments that name files which a command reads."""
+"""Arguments that name input files of a command."""
 HIDDEN = ("out", "pictures", "json")
-"""Arguments on which a result does not depend."""
+"""Arguments that do not change a result."""
 
 
 @contextmanager

@@ -1,18 +1,19 @@
 """How accurate corrected modes become, and how many vectors are carried for that."""
 
 EIGENVALUE_TOLERANCE = 1e-7
-"""Relative eigenvalue error that a correction stops at unless told otherwise."""
+"""Default of the relative eigenvalue error at which a correction stops."""
 INTERACTIVE_TOLERANCE = 1e-2
-"""Relative eigenvalue error of the worst mode that is good enough while a material is designed."""
+"""Relative error of the worst eigenvalue that suffices while a material is designed."""
 STEPWISE = ("krylov", "relaxation")
-"""Accelerations that correct every mode by itself, step by step."""
+"""Accelerations that correct every mode by itself."""
 ACCELERATIONS = ("lanczos", *STEPWISE)
 LOOSE = 1e-3
-"""Tolerance from which on an inverse for a similar material is good enough for steps."""
+"""Least tolerance for which the inverse of a similar material serves for the steps."""
 GUARD_FRACTION, FEWEST_GUARDS = 0.22, 20
-"""Vectors carried beyond the wanted ones, as a share of these, and the fewest of them."""
+"""Guard vectors, carried beyond the requested modes: their share of these, and their least
+number."""
 IMPROVED_GUARDS = 0.4
-"""Share of the guard vectors that are improved too, for the sake of the last wanted modes."""
+"""Share of the guard vectors that are improved too, so that the last requested modes converge."""
 
 
 def carried_count(requested: int, tolerance: float) -> int:

@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SMALL_CORRECTION = 1e-6
-"""Length (squared) of corrections of unit vectors below which rounding spoils the identities."""
+"""Squared length of corrections of unit vectors below which rounding spoils the identities."""
 NEARLY_INSIDE = 1e-2
-"""Share (squared) of a correction outside the subspace below which that part is formed first."""
+"""Squared share of a correction outside the subspace below which that part is formed first."""
 ROWS_AT_ONCE = 1024
-"""Rows of a block that are scaled together, so that they stay in the cache."""
+"""Number of rows of a block that are scaled together, so that they stay in the cache."""
 MOST_PASSES = 3
-"""Times that the corrections are orthogonalised; twice is enough but for rounding."""
+"""Largest number of orthogonalisations of the corrections. Two suffice but for rounding."""
 
 
 class Ritz:

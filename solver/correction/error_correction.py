@@ -22,7 +22,7 @@ from solver.subspace.start import every_unknown, start_block
 Array = NDArray[np.float64]
 
 BLOCKS_OF_A_STEP = 3
-"""Blocks that a step of conjugate gradients spans: modes, residuals and directions."""
+"""Number of blocks that a step of conjugate gradients spans: modes, residuals and directions."""
 
 
 def correct(

@@ -17,22 +17,25 @@ from solver.subspace.orthonormal import largest_share, orthonormal
 Array = NDArray[np.float64]
 
 PESSIMISM = 3.0
-"""What the bounds on the operator's errors are above those of the Ritz values of K, at least."""
+"""Least ratio of the error bounds of the operator's eigenvalues to the errors of the Ritz values of
+K."""
 ZERO_FRACTION = 1e-8
-"""Share of the last wanted eigenvalue below which one is zero, and its error absolute."""
+"""Share of the last requested eigenvalue below which an eigenvalue counts as zero, and its error as
+absolute."""
 ROUNDING_FRACTION = 1e-3
-"""Share of the shift by which rounding may take a small eigenvalue below zero."""
+"""Largest distance below zero of a small eigenvalue by rounding, as a share of the shift."""
 ROUNDING = 1e-11
 """Error of an eigenvalue by rounding, as a share of the shift."""
 MOST_PASSES = 3
-"""Times that vectors are made orthogonal again; once is enough unless rounding alone is left."""
+"""Largest number of repeated orthogonalisations. One suffices unless rounding alone is left."""
 ORTHOGONAL = 1e-11
-"""Overlap with the basis that a block may be left with, at most."""
+"""Largest overlap of a block with the basis."""
 INDEPENDENT = 0.03
-"""Condition, see `orthonormal`, above which vectors come out orthonormal to 1e-12 at once."""
+"""Condition, see `orthonormal`, above which vectors come out orthonormal to 1e-12 in one pass."""
 EPSILON = float(np.finfo(float).eps)
 RESOLVED = 1e-2
-"""Share (squared) of the residual in the image of a Ritz vector below which it is resolved."""
+"""Squared share of the residual in the image of a Ritz vector below which the vector is
+resolved."""
 
 
 class KrylovBasis:

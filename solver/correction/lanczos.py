@@ -22,11 +22,11 @@ from solver.subspace.start import start_block
 Array = NDArray[np.float64]
 
 DECADES = 2.0
-"""Decades that a block takes off the error at least, until two looks have told."""
+"""Decades by which a block reduces the error at least, assumed until two looks have measured it."""
 HIGHEST_SHIFT = 0.8
-"""Share of the last wanted eigenvalue above which a shift is too high."""
+"""Largest shift, as a share of the last requested eigenvalue."""
 LONGEST = 4
-"""Dimension at which the iteration ends in any case, as a multiple of the modes wanted."""
+"""Largest dimension of the space, as a multiple of the modes requested."""
 
 
 @dataclass

@@ -22,14 +22,14 @@ from solver.subspace.rayleigh_ritz import rayleigh_ritz, reduced_eigenpairs
 Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 2048
-"""Rows of the basis that are multiplied together and written back."""
+"""Number of rows of the basis that are multiplied together and written back."""
 STAGNATION, PROGRESS = 12, 0.7
-"""Steps within which the worst error must fall to this share of what it was."""
+"""Number of steps within which the worst error must fall, and the share of it that may be left."""
 SAFETY = 2.0
-"""Error of an eigenvalue over what one cycle of the preconditioner makes of its residual, at most.
-"""
+"""Largest ratio of an eigenvalue's error to the estimate of it by one cycle of the
+preconditioner."""
 LEFT = 0.5
-"""Share of what the last step took off an eigenvalue that may be left of its error."""
+"""Error of an eigenvalue that may be left after a step, as a share of the last reduction."""
 
 
 @dataclass

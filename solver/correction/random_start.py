@@ -19,15 +19,15 @@ from solver.subspace.weyl import CountingLaw
 Array = NDArray[np.float64]
 
 MODES_OF_EIGHT, FEWEST_COLUMNS, MOST_COLUMNS = 100, 8, 24
-"""Modes for every eight columns of the first block, and its least and greatest width: the narrower,
-the fewer right-hand sides."""
+"""Number of modes for every eight columns of the first block, and its least and greatest width. A
+narrower block takes fewer right-hand sides."""
 NEAR = 20_000
-"""Unknowns beyond which a factorisation leaves the cache, and eight columns take as long as twice
-as many."""
+"""Number of unknowns beyond which a factorisation leaves the cache, and sixteen columns take as
+long as eight."""
 RANDOM_LOOK = 1.75
-"""Dimension of the space at the first look, as a share of the modes wanted."""
+"""Dimension of the space at the first look, as a multiple of the modes requested."""
 ATTEMPTS, OFF_RESONANCE = 3, 0.97
-"""Shifts that are tried, and by what the next is moved off an eigenvalue that one has hit."""
+"""Number of shifts that are tried, and the factor that moves the next off an eigenvalue."""
 
 
 @dataclass(frozen=True)

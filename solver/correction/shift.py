@@ -10,12 +10,13 @@ from solver.linear import Inverse, LinearSolver
 from solver.subspace.weyl import CountingLaw
 
 AIM, LEAST, MOST = 0.56, 0.3, 0.72
-"""Share of the wanted eigenvalues that is to lie below the shift, and what is as good as that: a
-further factorisation would cost more than it saves."""
+"""Share of the requested eigenvalues that should lie below the shift, and the range that is as
+good, since a further factorisation would cost more than it saves."""
 TRIES, MOST_TRIES = 4, 8
-"""Factorisations after which few eigenvalues below a shift are good enough, and at most."""
+"""Number of factorisations after which few eigenvalues below a shift suffice, and their largest
+number."""
 CROWDED = 1.5
-"""Factor within which too many eigenvalues follow for a shift between: fewer below it will do."""
+"""Ratio of shifts with too many and too few eigenvalues below up to which too few suffice."""
 
 
 def inverse_amid(

@@ -13,19 +13,20 @@ from solver.assembly.system import System
 Array = NDArray[np.float64]
 
 COLUMNS, FEWEST_COLUMNS = 64, 16
-"""Widest and narrowest block: the narrower, the fewer right-hand sides; the wider, the faster."""
+"""Greatest and least width of the block. A narrow one takes fewer right-hand sides, a wide one less
+time for each."""
 MIXED_IN_COLUMN = 4
-"""Wanted modes in a column of the first block; the space has to tell them apart again."""
+"""Number of requested modes in a column, which the Krylov space has to separate."""
 END_WEIGHT = 2.0
 """Exponent of a mode's distance to the shift, by which it enters the first block."""
 LEAST_WEIGHT = 1e-3
-"""Weight that it has at least, as a share of the greatest: the shift may be one of the values."""
+"""Least weight of a mode as a share of the greatest, since the shift may be an eigenvalue."""
 MIXED = 1.15
-"""Modes that enter the first block, as a share of those wanted, in case some are out of order."""
+"""Modes that enter the block as a multiple of those requested, in case some are out of order."""
 ROUGH = 1e-3
-"""Tolerance above which those wanted alone enter: fewer steps then tell them apart."""
+"""Tolerance above which only requested modes enter, so that fewer steps separate them."""
 FIRST_LOOK = 1.25
-"""Dimension of the space at the first look at its Ritz values, as a share of the modes mixed."""
+"""Dimension of the space at the first look at its Ritz values, as a multiple of the modes mixed."""
 
 
 def mixed(

@@ -24,24 +24,25 @@ from solver.subspace.spectrum import WEYL_EXPONENT
 Array = NDArray[np.float64]
 
 TYPICAL = 0.1
-"""Share of the tolerance that the median of the errors has to reach."""
+"""Largest median of the errors, as a share of the tolerance."""
 NEARLY_ACCURATE = 100.0
 """Error, as a multiple of the tolerance, below which `lanczos` leaves a start to `krylov`."""
 FOLLOWED = 50.0
-"""The same as a multiple of `NEARLY_ACCURATE`, where an inverse for a similar material is there."""
+"""Factor of `NEARLY_ACCURATE` where there is an inverse for a similar material."""
 WORTH_INEXACT = 50.0
-"""Error, as a multiple of the tolerance, above which a second step is no longer taken with it."""
+"""Largest error, as a multiple of the tolerance, at which that inverse serves for a second step."""
 SHIFT_FRACTION = 0.52
-"""Shift of an indefinite factorisation, as a share of the last wanted eigenvalue."""
+"""Shift of an indefinite factorisation, as a share of the last requested eigenvalue."""
 TOP, TOP_FRACTION, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
-"""With all modes accurate below the first share of the last wanted value, the shift is the second,
-and too high above the third."""
+"""Shares of the last requested eigenvalue: if all modes below the first are accurate, the shift is
+the second, and too high above the third."""
 LANCZOS_RUNS, OFF_RESONANCE = 3, 0.97
-"""Lanczos iterations at most, and by what the shift is moved off an eigenvalue it has hit."""
+"""Largest number of Lanczos iterations, and the factor that moves the shift off an eigenvalue."""
 STAGNATION, PROGRESS = 6, 0.8
-"""Steps after which a correction gives up, if the error is not below this share of their worst."""
+"""Number of steps after which a correction gives up unless the error fell to this share of their
+worst."""
 ROUGH_MASS = 0.5
-"""Consistent mass of a rough residual, as a share of what the row sums make of it."""
+"""Ratio of the consistent mass of a rough residual to that by row sums."""
 
 
 class SubspaceIteration:

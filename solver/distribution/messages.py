@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 AnyArray = NDArray[Any]
 
 MOST_ARRAYS = 10
-"""Arrays that one announcement has room for."""
+"""Largest number of arrays in one announcement."""
 MOST_DIMENSIONS = 3
 
 _TYPES = tuple(np.dtype(name) for name in ("f8", "i8", "i4", "u1"))

@@ -18,21 +18,22 @@ from carillon.processes.threads import one_thread
 EMBEDDING_MODES = 12
 """Laplacian eigenvectors that span the clustering space, the constant left out."""
 SUBDOMAIN_DOFS = 1800
-"""Aimed unknowns of a subdomain."""
+"""Number of unknowns that a subdomain should have."""
 FEWEST_SUBDOMAINS = 4
-"""Subdomains of the smallest models, so that a few ranks can share them."""
+"""Number of subdomains of the smallest models, so that a few ranks can share them."""
 FEW_CLUSTERS = 16
-"""Subdomains up to which SciPy finds them."""
+"""Largest number of subdomains that SciPy's k-means finds."""
 ITERATIONS, TRIES = 20, 4
-"""Of SciPy's k-means, whose seeding is not greedy like scikit-learn's; the best try counts."""
+"""Iterations and tries of SciPy's k-means, whose seeding is not greedy. The best try counts."""
 FEWEST_POINTS, FEWEST_VERTICES = 10, 1000
-"""Vertices for each subdomain, and altogether, of the coarsest graph that these are found on."""
+"""Least number of vertices of the coarsest graph that is clustered, for each subdomain and
+altogether."""
 SMOOTHINGS, FURTHER_ITERATIONS = 3, 2
 """Jacobi steps of the eigenvectors, and iterations of k-means, on each finer graph."""
 FEWEST_HOLDING = 3
-"""Corners of one cell that a subdomain needs there for the cell to hold them together."""
+"""Least number of corners of a cell in a subdomain for the cell to hold them together."""
 MOST_ROUNDS = 10
-"""Rounds of joining pieces of subdomains to their neighbours."""
+"""Largest number of rounds in which pieces of subdomains join their neighbours."""
 
 
 def default_subdomains(n_dofs: int) -> int:

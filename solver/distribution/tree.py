@@ -12,11 +12,11 @@ from scipy.sparse.csgraph import connected_components
 from carillon.errors import UserError
 
 LIGHTEST = 0.4
-"""Least share of the nodes of two partners that the lighter should have."""
+"""Least share of the nodes of two partners in the lighter one."""
 LIGHTEST_CONNECTED = 0.25
-"""The same where only so uneven a cut leaves both partners connected."""
+"""Least share in the lighter one where only so uneven a cut leaves both connected."""
 EIGENVECTORS = 3
-"""Eigenvectors of the graph of the subdomains that cuts are looked for in."""
+"""Number of eigenvectors of the graph of the subdomains that give cuts."""
 _HALVINGS = 50
 
 

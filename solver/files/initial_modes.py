@@ -22,7 +22,7 @@ from solver.files.modes_file import KIND, SCHEMA
 Array = NDArray[np.float64]
 
 COLUMNS = 16
-"""Modes that travel together."""
+"""Number of modes that travel together."""
 _ROWS = 13
 
 

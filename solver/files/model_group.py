@@ -22,7 +22,7 @@ from carillon.limits import DENSITIES, EDGES, POISSON
 Array = NDArray[np.float64]
 
 FINITE_CELLS = "finite_cells"
-"""Group that a solid of finite cells has."""
+"""Name of the group of a solid of finite cells."""
 
 
 def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str) -> None:

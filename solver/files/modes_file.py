@@ -26,15 +26,15 @@ Array = NDArray[np.float64]
 KIND = "modes"
 SCHEMA = 1
 ESTIMATE = "estimate"
-"""Phase that tells how far frequencies are from the solid's."""
+"""Phase that estimates how far frequencies are from the solid's."""
 FINE_TAKEN = "fine_taken"
 """Attribute that says why the fine solid was solved in place of a coarse one."""
 CHECKS = ("inertia", "completion", "verification", ESTIMATE)
-"""Phases that check modes, and find those that the check misses; no method is charged for them."""
+"""Phases that check modes, and find those that are missing. No method is charged for them."""
 ROUNDING = 1e-6
-"""Of the largest eigenvalue: what those of rigid motions may be below zero."""
+"""Largest distance of an eigenvalue below zero, as a share of the largest one."""
 SAME_SOLID = 1.000001
-"""Cell edges by which boxes around voxels of one solid may differ."""
+"""Largest difference of the boxes around voxels of one solid, in cell edges."""
 _COLUMNS_PER_CHUNK = 16
 _ROWS_PER_CHUNK = 1 << 20
 

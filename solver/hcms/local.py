@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 ZERO_FRACTION = 1e-10
-"""A local eigenvalue below this fraction of the ratio of the diagonals is a rigid motion's."""
+"""Local eigenvalue, as a fraction of the ratio of the diagonals, below which it is a rigid
+motion's."""
 
 
 @dataclass(frozen=True)

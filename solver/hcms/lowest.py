@@ -23,20 +23,21 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 DENSE_UNKNOWNS = 200
-"""Up to this size all pairs by LAPACK are as fast."""
+"""Largest number of unknowns at which LAPACK finds all pairs as fast."""
 DENSE_FRACTION = 0.4
-"""Above this share of wanted pairs LAPACK is faster too."""
+"""Share of requested pairs above which LAPACK is faster."""
 BLOCK_FRACTION = 0.55
-"""Width of the start block as a share of the wanted pairs."""
+"""Width of the start block as a share of the requested pairs."""
 STEPS, FEWER_STEPS = 2, 1
-"""Blocks that are added to the start block and its first correction, for modes that have to be good
-by themselves, and where what is done with them errs more."""
+"""Number of blocks added to the start block and its first correction: for modes that have to be
+accurate by themselves, and where later steps err more."""
 FIRST_SHIFT_FRACTION, SHIFT_FRACTION = 0.05, 0.3
-"""Shifts as shares of the last wanted eigenvalue, estimated from the start and after one step."""
+"""Shifts as shares of the last requested eigenvalue, estimated from the start and after one
+step."""
 INDEPENDENT = 1e-10
-"""Directions whose share (squared) of the basis is below this are dropped."""
+"""Squared share of the basis below which a direction is dropped."""
 WELL_CONDITIONED = 1e-4
-"""The same share, below which vectors are orthonormalised twice."""
+"""Squared share of the basis below which vectors are orthonormalised twice."""
 LEAST_BLOCK = 24
 
 

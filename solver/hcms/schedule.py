@@ -21,7 +21,7 @@ from solver.hcms.counts import eigen_flops
 from solver.hcms.scalapack import available, grid_side
 
 MOVED_COST = 0.3
-"""What it adds to the cost of a merge that both its groups have to be sent."""
+"""Addition to the cost of a merge if both its groups have to be sent."""
 PRODUCT_COST = 60.0
 """Operations of a merge's products for each of n^2 reduced unknowns and (nodes)^(2/3), about."""
 SHARED_PRODUCTS = 1e9

@@ -15,7 +15,7 @@ from solver.hcms.scalapack import ProcessGrid, places
 Array = NDArray[np.float64]
 
 CHECK_TOLERANCE = 1e-8
-"""Largest relative error of what the eigenvectors should make of K and M."""
+"""Largest relative error of the eigenvectors' products with K and M."""
 _PENCIL, _VECTORS = 21, 22
 
 

@@ -31,7 +31,7 @@ from solver.hcms.schedule import modes_to_keep, schedule
 Array = NDArray[np.float64]
 
 FEW_SUBDOMAINS = 8
-"""Subdomains up to which the accuracy of their modes tells."""
+"""Largest number of subdomains at which the accuracy of their modes matters."""
 _DOWN = 12
 
 

@@ -27,7 +27,7 @@ LARGEST_SHARED = 500_000
 MOST_LED = 8
 """Ranks of one machine up to which `auto` has one of them factorise, with threads, for all."""
 MEMORY_SHARE = 0.8
-"""Of the free memory, what a factorisation may take."""
+"""Share of the free memory that a factorisation may take."""
 
 
 class Inverse(Protocol):

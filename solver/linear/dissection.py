@@ -18,7 +18,7 @@ from solver.linear import symbolic
 Index = NDArray[np.int64]
 
 LEAF_NODES = 48
-"""Nodes that are no longer cut but eliminated together."""
+"""Number of nodes that are eliminated together instead of cut."""
 SHORTEST_SIDE = 0.2
 """Least share of the nodes on either side of a cut, if there is such a cut."""
 

@@ -8,12 +8,12 @@ from carillon.errors import ConvergenceError, UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 
 ROOM = (50, 200, 800)
-"""Percent by which MUMPS's guess of the memory it needs is exceeded, tried one after the other.
-Pivots that have to wait are in no guess, and on several ranks their number differs between runs."""
+"""Percentages by which the memory exceeds MUMPS's guess, tried one after the other. Pivots that
+have to wait are in no guess, and on several ranks their number differs between runs."""
 _ROOM = 14
-"""MUMPS's control of it."""
+"""MUMPS's control of that percentage."""
 _TOO_LITTLE_ROOM = (-8, -9, -17, -20)
-"""What MUMPS's INFOG(1) says then."""
+"""Values of MUMPS's INFOG(1) if the memory was too little."""
 
 
 @on_all_ranks()

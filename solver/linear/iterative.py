@@ -29,17 +29,16 @@ TOLERANCE = 1e-1
 a Rayleigh-Ritz method, and from here on its eigenvalues hardly tell them from exact ones: on the
 bunny at resolution 32, 1e-1 takes as many correction steps as a factorisation, 3e-1 takes more."""
 MAX_ITERATIONS = 2000
-"""Iterations that a right-hand side may take."""
+"""Largest number of iterations for a right-hand side."""
 STALL_ITERATIONS = 300
-"""Iterations within which the smallest residual of a column must fall."""
+"""Number of iterations within which the smallest residual of a column must fall."""
 STALL_REDUCTION = 0.9
-"""Factor by which it must fall."""
+"""Factor by which the smallest residual of a column must fall."""
 TINY = np.finfo(float).tiny
 COLUMNS = 64
-"""Right-hand sides that are advanced together."""
+"""Number of right-hand sides that are advanced together."""
 ROUNDS = 3
-"""Times that the iteration is restarted from the true residual, which rounding parts from the
-recursive one."""
+"""Number of restarts from the true residual, from which rounding parts the recursive one."""
 
 
 class Operators(Protocol):

@@ -31,9 +31,10 @@ from solver.linear.sweeps import (
 Array = NDArray[np.float64]
 
 COLUMNS = 64
-"""Right-hand sides that are carried through the fronts together."""
+"""Number of right-hand sides that go through the fronts together."""
 FEWEST = 24
-"""Right-hand sides for each thread from which it takes them through all fronts by itself."""
+"""Least number of right-hand sides for each thread at which a thread takes its own through all
+fronts."""
 
 
 class Factor:

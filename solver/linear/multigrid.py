@@ -23,16 +23,16 @@ from solver.linear.petsc_options import MULTIGRID_PREFIX
 Array = NDArray[np.floating]
 
 THRESHOLD = 0.0
-"""Couplings weaker than this, relative to the diagonal, do not join an aggregate."""
+"""Largest coupling, relative to the diagonal, that does not join an aggregate."""
 COARSEST_UNKNOWNS = 600
-"""Levels end at this many unknowns or fewer, whose matrix is inverted."""
+"""Largest number of unknowns of the coarsest level, whose matrix is inverted."""
 SMOOTHED_SPECTRUM = (0.1, 1.1)
 """Interval that the smoother damps, as fractions of the largest eigenvalue's estimate; above one,
 since the estimate comes from below."""
 LANCZOS_STEPS = 20
-"""Steps of the estimate."""
+"""Lanczos steps of the estimate of the largest eigenvalue."""
 EXHAUSTED = 1e-6
-"""A next Lanczos vector that is this small, relative to the matrix, is nothing but rounding."""
+"""Size of a next Lanczos vector, relative to the matrix, below which it is rounding."""
 
 
 class Multigrid:

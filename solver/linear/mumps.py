@@ -15,7 +15,7 @@ from solver.linear.petsc_options import INNER_PREFIX
 Array = NDArray[np.float64]
 
 COLUMNS = 128
-"""Right-hand sides that MUMPS carries through its factor together."""
+"""Number of right-hand sides that MUMPS carries through its factor together."""
 _BLOCKING, _ROOT_ON_ONE = 27, 13
 """MUMPS's controls of that, and of whether the root of the tree lies on one rank."""
 

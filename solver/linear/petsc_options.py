@@ -10,9 +10,9 @@ from carillon.errors import UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 
 OPTIONS_PREFIX = "carillon_"
-"""What the names of PETSc's options for this program begin with."""
+"""Prefix of PETSc's options for this program."""
 INNER_PREFIX, MULTIGRID_PREFIX = f"{OPTIONS_PREFIX}inner_", f"{OPTIONS_PREFIX}amg_"
-"""The same for linear solvers of the correction."""
+"""Prefixes of PETSc's options for linear solvers of the correction."""
 OUT_OF_MEMORY, OTHER_LIBRARY = 55, 76
 """PETSc's codes of errors that one rank may have alone; all ranks dislike options together."""
 _ASKED_LATE = ("view", "monitor", "reason")

@@ -14,13 +14,14 @@ from solver.linear.dissection import Fronts, dissect
 Index = NDArray[np.int64]
 
 PANEL = 120
-"""Rows of a front that are eliminated together."""
+"""Number of rows of a front that are eliminated together."""
 STRIP = 192
-"""Columns of W, and rows of an update, that lie together in memory; whole nodes."""
+"""Number of columns of W, and of rows of an update, that lie together in memory: whole nodes."""
 BRANCHES = 3
-"""Branches for each thread, at least: their work is not equal."""
+"""Least number of branches for each thread, since their work is not equal."""
 MEMORY_MARGIN = 1.2
-"""Memory of fronts and updates over what one thread would need, since several are at work."""
+"""Memory of fronts and updates as a multiple of the need of one thread, since several are at
+work."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
 MAX_ITERATIONS = 500
 ARPACK_MARGIN = 2
-"""Unknowns beyond the pairs wanted that ARPACK needs."""
+"""Number of unknowns that ARPACK needs beyond the requested pairs."""
 SUBSPACE, FEWEST_MORE = 1.25, 24
 """Vectors that Krylov-Schur keeps for each pair wanted, and least number beyond these.  To make the
 two a pair that SLEPc would keep orthogonal takes longer than the solves that they save."""

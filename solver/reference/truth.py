@@ -20,13 +20,13 @@ from solver.subspace.start import start_vector
 Array = NDArray[np.float64]
 
 RESIDUAL_TOLERANCE = 1e-10
-"""Relative residual of ground truth unless told otherwise."""
+"""Default of the relative residual of ground truth."""
 SPARE_MODES = 8
-"""Modes computed beyond those asked for, so that the inertia count finds a gap to look through."""
+"""Number of modes computed beyond those requested, so that the inertia count finds a gap."""
 FRUITLESS_SEARCHES = 3
-"""Searches in a row that find nothing, after which missing eigenvalues are given up."""
+"""Number of successive searches without a result after which missing eigenvalues are given up."""
 ABOVE_ALL = 1e-6
-"""Relative distance from the last eigenvalue at which nothing but it is counted."""
+"""Relative distance above the last eigenvalue at which all are counted."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ from solver.refinement.weighing import Weighing
 Array = NDArray[np.float64]
 
 UNTOLD = "how far frequencies are off cannot be told"
-"""Why the fine solid is taken where an estimate fails."""
+"""Reason for the fine solid where an estimate fails."""
 
 
 @dataclass

@@ -15,7 +15,7 @@ from carillon.fem.model import ElasticModel
 Array = NDArray[np.float64]
 
 NUMBERS_AT_ONCE = 1 << 22
-"""Numbers of element displacements that exist together."""
+"""Number of element displacements that exist at once."""
 
 
 def element_energies(model: ElasticModel, vectors: Array) -> Array:

@@ -15,12 +15,11 @@ Array = NDArray[np.float64]
 FIRST = RIGID_MODES + 1
 """Number of the first mode whose error is estimated."""
 LAST = 60
-"""Number of the last one."""
+"""Number of the last mode whose error is estimated."""
 FROM_FINE, FROM_SOLID = "expected_frequency_error", "solid_frequency_error"
-"""What the names of attributes begin with that tell errors against the fine voxels and against the
-solid."""
+"""Prefixes of the attributes with errors against the fine voxels and against the solid."""
 WORST = 3.0
-"""The worst frequency may be off by so many times what their root mean square may."""
+"""Largest error of a frequency, as a multiple of their allowed root mean square."""
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,10 @@ from solver.refinement.inverse_iteration import InverseIteration, NearModes
 Array = NDArray[np.float64]
 
 MODES_USED = LAST + 12
-"""Modes that are looked at, since modes may change places."""
+"""Number of modes that are compared, since modes may change places."""
 COLUMNS_USED = LAST - RIGID_MODES + 2
-"""Elastic ones that are iterated; the random vectors beside them find those that are missing."""
+"""Number of elastic modes that are iterated. Random vectors beside them find those that are
+missing."""
 
 
 @dataclass(frozen=True)

@@ -32,12 +32,13 @@ Array = NDArray[np.float64]
 AMID = (0.45, 0.65)
 """Shares of the rated eigenvalues between which the shift lies, in their widest gap."""
 ITERATIONS = 2
-"""Inverse iterations."""
+"""Number of inverse iterations."""
 RANDOM_VECTORS = 16
-"""Random vectors beside the coarse modes, which lead to modes that the coarse model lacks."""
+"""Number of random vectors beside the coarse modes, which lead to modes that the coarse model
+lacks."""
 NEXT_TO_SHIFT, FAR_FROM_SHIFT = 1e-3, 1e-2
-"""Relative distance from the value below which eigenvalues are counted, within which one may lie on
-either side of it: where that is the shift, and where the shift is below all."""
+"""Relative distance from the value below which eigenvalues are counted, within which an eigenvalue
+may lie on either side: if the value is the shift, and if the shift is below all eigenvalues."""
 
 
 @dataclass(frozen=True)

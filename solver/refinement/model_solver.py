@@ -15,7 +15,7 @@ from solver.analysis.options import SolverOptions
 from solver.refinement.fine_start import FineStart
 
 ESTIMATE_TOLERANCE = 1e-4
-"""Relative error of the eigenvalues that voxels are compared with."""
+"""Relative error of the eigenvalues with which those of voxels are compared."""
 
 
 class SolveModel(Protocol):

@@ -10,9 +10,9 @@ from carillon.parameters.quantities import between
 from solver.coarsening.forest import FOREST
 
 ALLOWED_ERROR = 0.05
-"""Expected error of frequencies that blocks are kept fine for if nothing is said."""
+"""Default of the expected error of frequencies down to which blocks are kept fine."""
 ALLOWED_DISTANCE = 0.01
-"""Expected distance from the solid's that finite cells are divided for if nothing is said."""
+"""Default of the expected distance from the solid's frequencies down to which cells are divided."""
 
 
 @parameters

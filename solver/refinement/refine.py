@@ -23,7 +23,7 @@ Refined = TypeVar("Refined", bound=Solid, covariant=True)
 
 
 FINE_BLOCKS, DIVIDED_CELLS = "fine_blocks", "divided_cells"
-"""What is counted as refined: blocks that stay fine, and cells that are divided."""
+"""Attributes that count what was refined: blocks that stay fine, and cells that are divided."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from solver.coarsening.model import coarse_model, element_moduli
 Array = NDArray[np.float64]
 
 REMAINING = 0.4
-"""Share of the allowed error that elements are refined to, if shares were errors."""
+"""Share of the allowed error at which refinement aims, if shares were errors."""
 
 
 class RefinedModel:

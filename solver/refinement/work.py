@@ -16,17 +16,18 @@ from solver.coarsening.model import block_moduli
 Array = NDArray[np.float64]
 
 MODES_OF_FACTOR = 50
-"""Modes that take as long to find as the factorisation and what else does not depend on them."""
+"""Number of modes that take as long as the factorisation and all else that does not depend on
+them."""
 GROWTH, TYPICAL = 0.2, 8000
-"""Exponent by which work for an unknown grows, and unknowns at which it is 1."""
+"""Exponent by which the work for an unknown grows, and the number of unknowns at which it is 1."""
 OVERHEAD = 40_000
-"""What any analysis takes, however small."""
+"""Work of any analysis, however small."""
 ESTIMATE_MODES = 60
 ESTIMATE, ESTIMATE_AGAIN = 0.5, 0.25
 """Work of the first estimate and of each further one, as shares of finding the modes that are
 rated on the fine mesh."""
 SLOWNESS = {"hcms": (2.0, 0.0), "slepc": (3.5, 0.35), "arpack": (4.0, 0.35)}
-"""Work of an analysis by other methods than the fastest, as a multiple of that, at `TYPICAL`
+"""Work of an analysis by slower methods than the fastest: as a multiple of that at `TYPICAL`
 unknowns, and the exponent by which it grows."""
 CLEARLY, REFINED = 0.6, 0.8
 """Shares of the fine analysis's work below which a coarse model and its estimate are clearly less,

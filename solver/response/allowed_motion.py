@@ -10,7 +10,7 @@ from solver.response.response import Contacts, Damping, displacements, impulse_r
 Array = NDArray[np.float64]
 
 INSTANTS = 150
-"""Instants at which the bound is taken, at most."""
+"""Largest number of instants at which the bound is taken."""
 
 
 def motion_limit(

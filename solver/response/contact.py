@@ -16,9 +16,9 @@ from solver.response.surface import Surface, surface_of
 Array = NDArray[np.float64]
 
 RULING_MODES = 6
-"""Elastic modes, from the first on, that decide where a solid is struck."""
+"""Number of the lowest elastic modes, which decide where a solid is struck."""
 FAR = 0.5
-"""Share of the largest distance on the surface from the strike that counts as far from it."""
+"""Least distance from the strike that counts as far, as a share of the largest on the surface."""
 
 
 @dataclass(frozen=True)

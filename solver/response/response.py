@@ -19,13 +19,13 @@ from solver.response.points import motion_at
 Array = NDArray[np.float64]
 
 SAMPLE_RATE_HERTZ = 44_100
-"""Samples of a sound per second."""
+"""Samples of a sound per second [Hz]."""
 AUDIBLE_HERTZ = (20.0, 20_000.0)
-"""Frequencies that sound; below and above nothing is heard."""
+"""Lowest and highest frequency that is heard [Hz]."""
 STRIKE_SECONDS = 0.4
-"""Time from one strike to the next in a sound."""
+"""Time from one strike to the next in a sound [s]."""
 FLOOR_DECIBELS = -60.0
-"""Level below the loudest at which a spectrogram ends."""
+"""Level, relative to the loudest, at which a spectrogram ends [dB]."""
 _WINDOW_SECONDS, _HOP_SECONDS = 0.023, 0.004
 
 

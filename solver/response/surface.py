@@ -21,15 +21,17 @@ logger = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 
 SMOOTHING = 2
-"""Rings of faces that a normal is averaged over, since faces of voxels look along the axes only."""
+"""Number of rings of faces that a normal is averaged over. Faces of voxels look along the axes
+only."""
 REACH = 3.0
-"""Cell edges that a point named by a person may be away from the surface."""
+"""Largest distance of a named point from the surface, in cell edges."""
 FITTED = 12
-"""Points of the surface of finite cells that a tangent plane is fitted to."""
+"""Number of points on the surface of finite cells that a tangent plane is fitted to."""
 OUTSIDE = 0.1
-"""Cell edges beyond the surface of finite cells up to which a point counts as on it."""
+"""Largest distance outside the surface of finite cells at which a point counts as on it, in cell
+edges."""
 VANISHING = 1e-6
-"""Sums of unit normals shorter than this have no direction."""
+"""Length of a sum of unit normals below which it has no direction."""
 
 
 @dataclass(frozen=True)

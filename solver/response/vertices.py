@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # Its import takes long, and most of the room needs no surfac
 Array = NDArray[np.float64]
 
 PROBE = 1e-3
-"""Step from a vertex, over the longest side, that tells inside from outside."""
+"""Step from a vertex that tells inside from outside, over the surface's longest side."""
 CLEAR = 0.25
 """Difference of winding numbers that tells inside from outside beyond their error."""
 

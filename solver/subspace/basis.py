@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 
 ROWS_COMBINED = 512
-"""Rows of all blocks that are brought together for a product."""
+"""Number of rows of all blocks that are brought together for a product."""
 
 
 class BlockBasis:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DEPENDENT = 1e-11
-"""Directions whose share (squared) of the vectors is below this are dropped."""
+"""Squared share of the vectors below which a direction is dropped."""
 WELL_CONDITIONED = 1e-3
-"""Least diagonal entry of the Cholesky factor of the scaled Gram matrix to rely on it."""
+"""Least diagonal entry of the scaled Gram matrix's Cholesky factor for which the factor is used."""
 CANCELLED = 1e4
-"""Times as long as the rest of a vector from which on what was taken calls for taking twice."""
+"""Ratio of the part taken from a vector to the rest from which it is taken twice."""
 
 
 def orthonormal(gram: Array) -> tuple[Array, float]:

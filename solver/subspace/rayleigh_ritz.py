@@ -13,19 +13,21 @@ from solver.distribution.collective import bcast_from_root
 Array = NDArray[np.float64]
 
 RIGID_TOLERANCE = 1e-7
-"""A column whose elastic part is shorter than this fraction of it is a rigid motion."""
+"""Share of a column's length below which its elastic part is rounding, and the column a rigid
+motion."""
 ELASTIC = 1e-13
-"""The same for its rigid part: below it nothing but rounding is to be removed."""
+"""Share of a column's length below which its rigid part is rounding."""
 WELL_CONDITIONED = 1e-3
 """Least diagonal entry of the Gram matrix's Cholesky factor for which the factor is used."""
 RANK_TOLERANCE = 1e-13
-"""Directions whose share of the basis falls below this are dropped as linearly dependent."""
+"""Share of the basis below which a direction is dropped as linearly dependent."""
 PROBES, ORTHONORMAL = 4, 1e-10
-"""Combinations that are tried for orthonormality, and how far they may be from it."""
+"""Number of combinations that are tried for orthonormality, and their largest deviation from it."""
 POLYNOMIAL_DEGREE = 3
 """Degree of the displacement fields that estimate the first elastic eigenvalue."""
 HINGE_TOLERANCE = 1e-13
-"""An estimate below this fraction of the stiffest polynomial field's is zero to rounding."""
+"""Estimate, as a fraction of the stiffest polynomial field's, below which it is zero to
+rounding."""
 SHIFT_FRACTION = 0.1
 """Shift of the singular stiffness, as a fraction of the first elastic eigenvalue's estimate."""
 

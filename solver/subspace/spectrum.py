@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 WEYL_EXPONENT = 2.0 / 3.0
-"""Growth of the eigenvalues of a compact body with their number."""
+"""Exponent by which the eigenvalues of a compact body grow with their number."""
 CLUSTER_GAP = 1e-3
-"""Eigenvalues closer than this, relatively, are one cluster."""
+"""Largest relative distance of neighbours in a cluster of eigenvalues."""
 
 
 def clusters(values: Array, gap: float = CLUSTER_GAP) -> list[slice]:

@@ -15,7 +15,7 @@ from carillon.fem.model import RIGID_MODES
 Array = NDArray[np.float64]
 
 SAME = 0.5
-"""Overlap from which two modes count as the same."""
+"""Least overlap of two modes that count as the same."""
 DEPENDENT = 1e-10
 """Share of the largest eigenvalue of a Gram matrix below which vectors are dependent."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from carillon.fem.model import Solid
 
 EQUAL = 1e-9
-"""Relative difference up to which two constants are the same."""
+"""Largest relative difference of two constants that count as the same."""
 
 
 def on_one_mesh(one: Solid, other: Solid) -> bool:

@@ -19,17 +19,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ROUNDING = 100.0 * float(np.finfo(float).eps)
-"""Eigenvalues below this fraction of what they would be, did strains of neighbours not cancel, are
-zero to rounding."""
+"""Share of the eigenvalue that a mode would have without cancellation of neighbours' strains, below
+which an eigenvalue is zero to rounding."""
 SOFT = 1e-9
-"""Eigenvalues below this fraction of the largest computed one count as zero as well ..."""
+"""Share of the largest computed eigenvalue below which an eigenvalue may count as zero, see
+`SOFTER`."""
 SOFTER = 1e-6
-"""... if they are below this fraction of what smooth displacements of the whole solid make of the
-first elastic one: slender solids are as soft by themselves."""
+"""Share of the first elastic eigenvalue, as smooth displacements of the whole solid give it, below
+which a soft one counts as zero. Slender solids are as soft by themselves."""
 ORTHOGONALITY_TOLERANCE = 1e-8
 """Largest accepted entry of X^T M X - I."""
 COLUMNS_AT_ONCE = 64
-"""Vectors that products are taken of together."""
+"""Number of vectors whose products are taken together."""
 
 
 def verify(system: System, values: Array, vectors: Array) -> tuple[Array, float]:
