@@ -70,14 +70,10 @@ class Place:
     vertex: int | None = None
 
 
-def locate(
-    surface: trimesh.Trimesh,
-    name: str,
-    at: Sequence[float] | None = None,
-    vertex: int | None = None,
-    unit: float = 1.0,
-) -> Strike:
-    """The vertex of the surface that is struck, and the direction into the solid there.
+def locate_all(
+    surface: trimesh.Trimesh, places: Sequence[Place], unit: float = 1.0
+) -> list[Strike]:
+    """The vertices that are struck for some targets, and the directions into the solid there.
 
     A line of progress tells how far a position is off the surface.
 
@@ -85,32 +81,16 @@ def locate(
     ----------
     surface
         Triangles in metres; vertices may be repeated, and triangles may face either way.
-    name : str
-        Of the target, for messages.
-    at : (3,) [mesh unit] or None
-        Position, whose nearest vertex is struck.
-    vertex : int or None
-        Number of the vertex; give this or `at`.
+    places
+        Where the targets are struck.
     unit : float [m]
         Metres per unit of the mesh's own coordinates.
 
     Raises
     ------
     UserError
-        If the position is further than `TOO_FAR` from the surface, or there is no such vertex.
-    """
-    return locate_all(surface, [Place(name, at, vertex)], unit)[0]
-
-
-def locate_all(
-    surface: trimesh.Trimesh, places: Sequence[Place], unit: float = 1.0
-) -> list[Strike]:
-    """`locate` for several targets.
-
-    Raises
-    ------
-    UserError
-        With a sentence for each target that cannot be struck, and for any two at one place.
+        With a sentence for each target whose position is further than `TOO_FAR` from the surface or
+        whose vertex is not there, and for any two at one place.
     """
     vertices, side = np.asarray(surface.vertices, dtype=float), longest_side(surface)
     found: list[tuple[str, int, float]] = []
@@ -138,7 +118,7 @@ def locate_all(
 
 
 def vertex_of(surface: trimesh.Trimesh, place: Place, unit: float) -> tuple[int, float]:
-    """Number of the vertex at a place, and how far it is from the point named [m]; see `locate`."""
+    """Number of the vertex at a place, and how far it is from the point named [m]; see `locate_all`."""
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")
     if place.vertex is None:

@@ -9,10 +9,15 @@ import trimesh
 from carillon.errors import UserError
 from carillon.fem.geometry import BUILTINS, builtin_surface
 from solver.response.vertices import inward_normals
-from sound.strikes import Place, locate, locate_all
+from sound.strikes import Place, Strike, locate_all
 from sound.surface import struck_surface
 
 PAN = "builtin:frying-pan"
+
+
+def locate(surface, name, at=None, vertex=None, unit=1.0) -> Strike:
+    """The vertex that one target is struck at."""
+    return locate_all(surface, [Place(name, at, vertex)], unit)[0]
 
 
 def ball(radius: float = 0.1) -> trimesh.Trimesh:

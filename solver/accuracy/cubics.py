@@ -110,10 +110,10 @@ def _numbers(model: FiniteCellModel) -> tuple[Index, int]:
     # Cells with nodes astray have no functions at the places of these.
     usable[nodes[astray.any(axis=1)][:, EDGES]] = False
     chosen = nodes[:, EDGES]
-    found, numbers = np.unique(chosen[usable[chosen]], return_inverse=True)
-    result = np.full(chosen.shape, len(found), dtype=np.int64)
+    used, numbers = np.unique(chosen[usable[chosen]], return_inverse=True)
+    result = np.full(chosen.shape, len(used), dtype=np.int64)
     result[usable[chosen]] = numbers
-    return result, len(found)
+    return result, len(used)
 
 
 def _typical(model: FiniteCellModel) -> float:

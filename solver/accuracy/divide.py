@@ -43,24 +43,24 @@ class DividedCells:
 
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
         """See `Refinable.advance`; cells are divided unless too many of them would have to be."""
-        found = estimate_cell_errors(self.model, values, modes)
-        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, len(self._places), found.errors)
-        above = found.errors.excess(tolerance)
+        estimate = estimate_cell_errors(self.model, values, modes)
+        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, len(self._places), estimate.errors)
+        above = estimate.errors.excess(tolerance)
         if above <= 1.0 or self._steps == MOST_STEPS:
             return step, True
-        chosen = self._chosen(found, REMAINING / above)
+        chosen = self._chosen(estimate, REMAINING / above)
         return step, not (len(chosen) and self._divide(chosen))
 
-    def _chosen(self, found: CellErrors, left: float) -> Index:
+    def _chosen(self, estimate: CellErrors, left: float) -> Index:
         """Places (d, 3) of cells to divide so that of the error a share is `left`, or of the worst.
 
         Those that were divided cannot be divided again.
         """
         cells = self.model.cells
         whole = cells.span == cells.span.max()
-        gains = np.where(whole, found.shares * (1.0 - 1.0 / found.factors), 0.0)
+        gains = np.where(whole, estimate.shares * (1.0 - 1.0 / estimate.factors), 0.0)
         order = np.argsort(-gains, kind="stable")
-        total = found.shares.sum()
+        total = estimate.shares.sum()
         count = 1 + int(np.searchsorted(np.cumsum(gains[order]), (1.0 - left) * total))
         most = MOST_DIVIDED * len(self._undivided.cells) - len(self._places)
         order = order[: min(count, int(most))]

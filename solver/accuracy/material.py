@@ -19,8 +19,6 @@ INTERPOLATED = ("uniform", "smooth")
 """Materials that vary gradually. In the others each voxel has a modulus of its own."""
 ARITHMETIC, HARMONIC = 1.0, -1.0
 """Powers of the arithmetic and of the harmonic mean."""
-NOISY = ("random", "noise")
-"""Materials whose moduli jump from voxel to voxel."""
 
 
 @dataclass(frozen=True)

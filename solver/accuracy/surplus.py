@@ -124,7 +124,7 @@ def losses(model: FiniteCellModel, modes: Array) -> tuple[Array, Array, Index]:
         for factor, lost in ((2, twice), (4, fourfold)):
             groups, corners = larger_cells(cells, pairs, factor * int(size))
             asked = np.where(np.isin(groups, groups[own]), groups, -1)
-            found = energy_lost(model, modes, asked, corners, factor * int(size))
-            lost[own] = found[own]
+            energies = energy_lost(model, modes, asked, corners, factor * int(size))
+            lost[own] = energies[own]
         group[own] = groups[own] + group.max(initial=0) + 1
     return twice, fourfold, np.unique(group, return_inverse=True)[1].ravel()

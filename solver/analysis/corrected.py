@@ -19,7 +19,7 @@ from solver.analysis.timing import Phases
 from solver.assembly.system import System
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, accurate_count, carried_count
 from solver.correction.error_correction import correct
-from solver.correction.random_start import Approximation, Cold, from_nothing
+from solver.correction.random_start import Approximation, LanczosStart, from_nothing
 from solver.distribution.local_mesh import LocalMesh
 from solver.linear import Lasting, LinearSolver
 from solver.reference.truth import SPARE_MODES, Truth, can_count
@@ -50,7 +50,7 @@ class _Start:
     values: Array | None
     vectors: Array | None
     similar: Lasting | None = None
-    begun: Cold | None = None
+    begun: LanczosStart | None = None
 
 
 class CorrectedModes:
@@ -180,7 +180,7 @@ class CorrectedModes:
         law: CountingLaw,
         near: Approximation | None,
     ) -> _Start:
-        cold = from_nothing(
+        begun = from_nothing(
             system,
             self._linear,
             requested,
@@ -191,7 +191,7 @@ class CorrectedModes:
             self._options.seed,
             near,
         )
-        return _Start(cold.found.values, cold.found.vectors, begun=cold)
+        return _Start(begun.result.values, begun.result.vectors, begun=begun)
 
 
 def _given(initial: Initial | None, same_mesh: bool) -> _Start:

@@ -45,8 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Audit and print."""
     with on_ranks():
         require_outputs(arguments)
-        found = audit_files(arguments.files, arguments.tolerance)
-        audits = {name: audit.as_dict() for name, audit in found.items()}
+        audited = audit_files(arguments.files, arguments.tolerance)
+        audits = {name: audit.as_dict() for name, audit in audited.items()}
     content = {"spectra": audits, "provenance": record(parameters(arguments))}
     write_json(arguments, content)
     wrong = any(audit["faults"] for audit in audits.values())

@@ -34,8 +34,10 @@ def run(arguments: argparse.Namespace) -> None:
     """Compare and print."""
     with on_ranks() as comm:
         require_outputs(arguments, comm)
-        found = bcast_from_root(comm, lambda: compare_each(arguments.candidates, arguments.truth))
-        comparisons = {name: each.as_dict() for name, each in found.items()}
+        compared = bcast_from_root(
+            comm, lambda: compare_each(arguments.candidates, arguments.truth)
+        )
+        comparisons = {name: each.as_dict() for name, each in compared.items()}
         content = {"comparisons": comparisons, "provenance": record(parameters(arguments))}
         write_json(arguments, content, comm)
         if comm.rank:

@@ -12,7 +12,7 @@ from solver.assembly.system import System
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, default_guard
 from solver.correction.enrichment import Ritz
 from solver.correction.lobpcg import lobpcg
-from solver.correction.random_start import Cold
+from solver.correction.random_start import LanczosStart
 from solver.correction.result import Correction
 from solver.correction.subspace_iteration import SubspaceIteration
 from solver.linear import Lasting, LinearSolver
@@ -37,7 +37,7 @@ def correct(
     report: Callable[[int, float], None] | None = None,
     observe: Callable[[int, Array], None] | None = None,
     similar: Lasting | None = None,
-    begun: Cold | None = None,
+    begun: LanczosStart | None = None,
     keep: bool = False,
 ) -> Correction:
     """Improve the `requested` lowest elastic modes from the block `start` until they are accurate.
@@ -97,13 +97,13 @@ def correct(
     early.  Otherwise it lies below the spectrum.
     """
     if acceleration == "lanczos" and linear.method == "amg-cg":
-        found = _by_gradients(system, start, requested, linear, tolerance, max_steps, report)
-        if found.errors.max() > tolerance > 0.0 and not keep:
+        result = _by_gradients(system, start, requested, linear, tolerance, max_steps, report)
+        if result.errors.max() > tolerance > 0.0 and not keep:
             raise ConvergenceError(
-                f"conjugate gradients reached an eigenvalue error of {found.errors.max():.1e} "
-                f"after {found.steps} steps, {tolerance:.1e} was asked for; allow more steps"
+                f"conjugate gradients reached an eigenvalue error of {result.errors.max():.1e} "
+                f"after {result.steps} steps, {tolerance:.1e} was asked for; allow more steps"
             )
-        return found
+        return result
     assert start is not None
     rough = values is not None and begun is None
     if values is None:
@@ -155,23 +155,25 @@ def _by_gradients(
         if start is None:
             start = inverse.precondition(system.times_mass(start_block(system, width, 0)))
         start = start[:, :width]
-        found = lobpcg(system, inverse.precondition, start, requested, tolerance, max_steps, report)
+        result = lobpcg(
+            system, inverse.precondition, start, requested, tolerance, max_steps, report
+        )
     finally:
         inverse.destroy()
     return Correction(
-        found.values[:requested],
-        np.ascontiguousarray(found.vectors[:, :requested]),
-        found.errors,
-        np.ascontiguousarray(found.vectors[:, requested:]),
-        found.steps,
-        found.solves,
-        found.steps + 1,
-        found.history,
+        result.values[:requested],
+        np.ascontiguousarray(result.vectors[:, :requested]),
+        result.errors,
+        np.ascontiguousarray(result.vectors[:, requested:]),
+        result.steps,
+        result.solves,
+        result.steps + 1,
+        result.history,
     )
 
 
 def _whole(values: Array, vectors: Array, requested: int) -> Correction:
     """Ritz pairs of the whole space, which are eigenpairs."""
     exact = np.full(requested, np.finfo(float).eps)
-    wanted = np.ascontiguousarray(vectors[:, :requested])
-    return Correction(values[:requested], wanted, exact, vectors[:, requested:])
+    lowest = np.ascontiguousarray(vectors[:, :requested])
+    return Correction(values[:requested], lowest, exact, vectors[:, requested:])

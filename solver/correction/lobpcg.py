@@ -33,7 +33,7 @@ LEFT = 0.5
 
 
 @dataclass
-class Found:
+class LobpcgResult:
     """Ritz pairs of the last step.
 
     Attributes
@@ -64,7 +64,7 @@ def lobpcg(
     tolerance: float,
     max_steps: int,
     report: Callable[[int, float], None] | None = None,
-) -> Found:
+) -> LobpcgResult:
     """Lowest elastic modes from a block of approximate ones.
 
     Parameters
@@ -131,7 +131,7 @@ def lobpcg(
         moving = errors[active] > 0.1 * tolerance
         basis.step(image[:, moving], active[moving])
         active = np.flatnonzero(errors > 0.1 * tolerance)
-    return Found(basis.values, basis.vectors, errors[:requested], step, solves, history)
+    return LobpcgResult(basis.values, basis.vectors, errors[:requested], step, solves, history)
 
 
 class _Trial:

@@ -51,10 +51,10 @@ class Approximation:
 
 
 @dataclass
-class Cold:
-    """What was found, and the inverse that it was found with."""
+class LanczosStart:
+    """Result of a block Lanczos iteration, and the inverse that it was found with."""
 
-    found: Lanczos
+    result: Lanczos
     inverse: Inverse
 
 
@@ -68,7 +68,7 @@ def from_nothing(
     tolerance: float,
     seed: int = 0,
     near: Approximation | None = None,
-) -> Cold:
+) -> LanczosStart:
     """Lowest elastic modes from random vectors, or from the modes of a coarser model.
 
     Parameters
@@ -118,11 +118,11 @@ def from_nothing(
                 tolerance,
                 columns,
             )
-        found = lanczos(system, inverse, start, accurate, width, tolerance, look, seed + 1)
-        if found.too_high and attempt < ATTEMPTS - 1:
-            last = float(found.values[requested - 1])
-        elif not found.resonant:
-            return Cold(replace(found, errors=found.errors[:requested]), inverse)
+        result = lanczos(system, inverse, start, accurate, width, tolerance, look, seed + 1)
+        if result.too_high and attempt < ATTEMPTS - 1:
+            last = float(result.values[requested - 1])
+        elif not result.resonant:
+            return LanczosStart(replace(result, errors=result.errors[:requested]), inverse)
         inverse.destroy()
         share *= OFF_RESONANCE
     raise ConvergenceError(

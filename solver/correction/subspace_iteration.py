@@ -13,7 +13,7 @@ from solver.correction.criteria import IMPROVED_GUARDS, LOOSE, carried_count, de
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.krylov import ZERO_FRACTION
 from solver.correction.lanczos import is_too_high, lanczos
-from solver.correction.random_start import Cold
+from solver.correction.random_start import LanczosStart
 from solver.correction.result import Correction
 from solver.correction.starting_block import mixed
 from solver.distribution.collective import bcast_from_root
@@ -73,14 +73,14 @@ class SubspaceIteration:
         if acceleration == "relaxation":
             self.width = self.improved = len(ritz.values)
             self.step = relax
-        self.told: Array | None = None
+        self.known_errors: Array | None = None
         self.steps = self.solves = self.blocks = 0
         self.history: list[float] = []
 
-    def go_on_from(self, begun: Cold) -> None:
+    def go_on_from(self, begun: LanczosStart) -> None:
         """Count what was done before, and take over what is known."""
-        self.made, self.told, self.steps = begun.inverse, begun.found.errors, 1
-        self.solves, self.blocks = begun.found.solves, begun.found.blocks
+        self.made, self.known_errors, self.steps = begun.inverse, begun.result.errors, 1
+        self.solves, self.blocks = begun.result.solves, begun.result.blocks
 
     def run(
         self,
@@ -184,7 +184,7 @@ class SubspaceIteration:
                     # No eigenvalue lies above the start's, so `krylov` has to go on from there.
                     self.ritz = ritz
                 else:
-                    self.told = result.errors
+                    self.known_errors = result.errors
                 break
             self.destroy()
         self.inside = True
@@ -257,11 +257,11 @@ class SubspaceIteration:
         errors of its own, far closer than those from residuals.
         """
         ritz = self.ritz
-        told, self.told = self.told, None
-        if told is not None and len(told):
-            if _are_accurate(told, tolerance):
-                ritz.errors[: self.requested] = told
-                return told, ritz.vectors[:, :0], ritz.active[:0]
+        known, self.known_errors = self.known_errors, None
+        if known is not None and len(known):
+            if _are_accurate(known, tolerance):
+                ritz.errors[: self.requested] = known
+                return known, ritz.vectors[:, :0], ritz.active[:0]
             # Far below the shift rounding mixes modes.
             ritz = self.ritz = Ritz(self.system, *rayleigh_ritz(self.system, ritz.vectors))
         # A vector may have been locked before others were found below it.
@@ -271,10 +271,10 @@ class SubspaceIteration:
         residual = ritz.residual(candidates)
         estimate = self._estimate(candidates, residual)
         ritz.errors[candidates] = bcast_from_root(self.system.comm, lambda: estimate)
-        wanted = np.argsort(ritz.values, kind="stable")[: self.requested]
-        errors = np.nan_to_num(ritz.errors[wanted], nan=np.inf)
+        lowest = np.argsort(ritz.values, kind="stable")[: self.requested]
+        errors = np.nan_to_num(ritz.errors[lowest], nan=np.inf)
         limit = tolerance if _typical(errors) <= TYPICAL * tolerance else TYPICAL * tolerance
-        inside = candidates[np.isin(candidates, wanted)]
+        inside = candidates[np.isin(candidates, lowest)]
         accurate = inside[ritz.errors[inside] <= limit]
         chosen = ~np.isin(candidates, accurate)
         ritz.lock(accurate)

@@ -37,15 +37,15 @@ def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     return result
 
 
-def optional(comm: MPI.Comm, told: str, compute: Callable[[], T]) -> T | None:
+def optional(comm: MPI.Comm, warning: str, compute: Callable[[], T]) -> T | None:
     """Result of what is not needed for the main one; None, and a warning, where it fails.
 
     Only errors that every rank raises are caught: after any other the ranks have lost each other.
 
     Parameters
     ----------
-    told
-        What the failure means, as a warning begins.
+    warning
+        What the failure means, which begins the warning.
     compute
         Called on every rank.
     """
@@ -56,7 +56,8 @@ def optional(comm: MPI.Comm, told: str, compute: Callable[[], T]) -> T | None:
             raise
         _, sentence = meaning(error)
         if comm.rank == 0:
-            say(f"warning: {told}: {sentence or f'{type(error).__name__}: {one_line(str(error))}'}")
+            cause = sentence or f"{type(error).__name__}: {one_line(str(error))}"
+            say(f"warning: {warning}: {cause}")
         return None
 
 

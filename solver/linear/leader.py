@@ -144,8 +144,8 @@ class _LedInverse:
     def solve(self, block: Array) -> Array:
         """Solutions for a row-major block of right-hand sides (local unknowns, k); collective."""
         whole = self._leader.collected(block)
-        found = self._leader.alone(lambda: cast(Factor, self._factor).solve(whole))
-        return self._leader.handed_out(found, block)
+        solution = self._leader.alone(lambda: cast(Factor, self._factor).solve(whole))
+        return self._leader.handed_out(solution, block)
 
     def destroy(self) -> None:
         """Forget the factor."""

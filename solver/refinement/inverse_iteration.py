@@ -100,11 +100,11 @@ class InverseIteration:
             self._factorise(_amid(values) if self.prepared.linear.indefinite else below)
         rows = scatter_rows(blocks, columns, self.prepared.local_mesh, comm)
         start = np.concatenate([rows, start_block(system, RANDOM_VECTORS, 0)], axis=1)
-        found, vectors = self._iterated(start)
-        if self.missed(found) and self._shift > 0.0:
+        ritz_values, vectors = self._iterated(start)
+        if self.missed(ritz_values) and self._shift > 0.0:
             self._factorise(below)
-            found, vectors = self._iterated(vectors)
-        return NearModes(found, vectors, self.missed(found))
+            ritz_values, vectors = self._iterated(vectors)
+        return NearModes(ritz_values, vectors, self.missed(ritz_values))
 
     def whole(self, vectors: Array) -> Array | None:
         """Vectors (n_dofs, k) in the mesh's order of nodes on rank 0, None elsewhere."""
@@ -136,13 +136,13 @@ class InverseIteration:
             vectors /= np.sqrt(system.column_products(vectors, vectors))
         return rayleigh_ritz(system, vectors)
 
-    def missed(self, found: Array) -> int:
+    def missed(self, values: Array) -> int:
         """Number of eigenvalues that were counted and are not among these (k,)."""
         if self._counted is None:
             return 0
         shift, below = self._counted
         slack = NEXT_TO_SHIFT if self._shift > 0.0 else FAR_FROM_SHIFT
-        return max(below - int((found < (1.0 + slack) * shift).sum()), 0)
+        return max(below - int((values < (1.0 + slack) * shift).sum()), 0)
 
 
 def _amid(values: Array) -> float:

@@ -108,8 +108,8 @@ def match_clusters(overlaps: Array, rows: list[slice], columns: list[slice]) -> 
     for column in columns:
         there = (partners >= column.start) & (partners < column.stop)
         partners[there] = np.sort(partners[there])
-    found = joined[np.arange(len(partners)), partners]
-    return Matching(partners, found, joined.max(axis=1))
+    paired = joined[np.arange(len(partners)), partners]
+    return Matching(partners, paired, joined.max(axis=1))
 
 
 def recognised(errors: Array, overlaps: Array) -> dict[str, Any]:

@@ -31,13 +31,13 @@ def material_difference(one: Solid, truth: Solid) -> dict[str, Any] | None:
         truth's, and `young`: the number of `cells` that differ, that of `all`, and the `largest`
         relative difference (infinite from zero).
     """
-    found: dict[str, Any] = {}
+    differing: dict[str, Any] = {}
     for name, a, b in (
         ("poisson", one.poisson, truth.poisson),
         ("density_kg_per_m3", one.density, truth.density),
     ):
         if abs(a - b) > EQUAL * abs(b):
-            found[name] = [float(a), float(b)]
+            differing[name] = [float(a), float(b)]
     if on_one_mesh(one, truth) and one.young.shape == truth.young.shape:
         step = np.abs(one.young - truth.young)
         other = step > EQUAL * np.abs(truth.young)
@@ -46,5 +46,9 @@ def material_difference(one: Solid, truth: Solid) -> dict[str, Any] | None:
             cells = other.reshape(len(other), -1).any(axis=1)
             with np.errstate(divide="ignore"):
                 largest = float((step[other] / np.abs(truth.young[other])).max())
-            found["young"] = {"cells": int(cells.sum()), "all": len(cells), "largest": largest}
-    return found or None
+            differing["young"] = {
+                "cells": int(cells.sum()),
+                "all": len(cells),
+                "largest": largest,
+            }
+    return differing or None

@@ -15,17 +15,20 @@ from carillon.fem import geometry
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, Constants
 from carillon.limits import require_constants
-from solver.accuracy.lattices import voxel_lattice, voxel_mesh
-from solver.accuracy.material import INTERPOLATED, NOISY, PlacedMaterial
+from solver.accuracy.lattices import voxel_lattice
+from solver.accuracy.material import INTERPOLATED, PlacedMaterial
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
 from solver.verification.errors import frequency_errors
+from studies.discretisation.lattices import voxel_mesh
 from studies.discretisation.methods import TOLERANCE, Given, TimedSpectrum, Ways
 from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, SolidTruth
 
 Array = NDArray[np.float64]
 
+NOISY = ("random", "noise")
+"""Materials whose moduli jump from voxel to voxel."""
 WARM_UP = ProblemOptions("builtin:box", 8)
 """Solid on which everything is compiled and loaded before the clock runs."""
 WARM_UP_MODES = 12

@@ -16,7 +16,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Constants, Solid, fine_model
 from solver.accuracy.divide import DividedCells
-from solver.accuracy.lattices import covering_on, scaled, voxel_mesh
+from solver.accuracy.lattices import covering_on
 from solver.accuracy.material import ARITHMETIC, HARMONIC, PlacedMaterial
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
@@ -29,6 +29,7 @@ from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
 from solver.refinement.refine import Refinable, solve_refined
 from solver.refinement.refined_model import RefinedModel
+from studies.discretisation.lattices import scaled, voxel_mesh
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh

@@ -10,8 +10,9 @@ import pytest
 
 from carillon.fem.geometry import builtin_surface, hexmesh_from_grid
 from carillon.fem.geometry.grid import Grid
-from solver.accuracy.lattices import covering_on, scaled, voxel_lattice, voxel_mesh
+from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.material import HARMONIC, PlacedMaterial
+from studies.discretisation.lattices import scaled, voxel_mesh
 from studies.discretisation.methods import TimedSpectrum
 from studies.discretisation.truth import SolidTruth
 

@@ -190,7 +190,7 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> Profile:
     width = carried_count(wanted, EIGENVALUE_TOLERANCE)
     accurate = accurate_count(wanted, EIGENVALUE_TOLERANCE)
     cold = from_nothing(system, linear, wanted, accurate, width, law, EIGENVALUE_TOLERANCE, seed)
-    found, shift = cold.found, cold.inverse.shift
+    found, shift = cold.result, cold.inverse.shift
     cold.inverse.destroy()
     del cold
     start = start_block(system, -(-found.solves // found.blocks), seed)

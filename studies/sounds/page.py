@@ -14,7 +14,7 @@ from solver.response.response import spectrogram
 from sound.rendering.listening import Listening
 from sound.rendering.render import residual_share
 from sound.rendering.solid import SoundingSolid
-from sound.strikes import locate
+from sound.strikes import Place, locate_all
 from studies.base.media import embedded, highest_hertz, inlined, spectrogram_figure, wav_uri
 from studies.base.page import rendered
 from studies.base.table import Table
@@ -176,7 +176,7 @@ def _elsewhere(results: SoundResults) -> Mark:
     surface = trimesh.Trimesh(
         results.design.surface_vertices, results.design.surface_faces, process=False
     )
-    strike = locate(surface, *results.example.elsewhere, unit=results.design.unit)
+    (strike,) = locate_all(surface, [Place(*results.example.elsewhere)], results.design.unit)
     return Mark(ELSEWHERE_CLASS, strike.position, strike.inward)
 
 
