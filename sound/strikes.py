@@ -118,7 +118,7 @@ def locate_all(
 
 
 def vertex_of(surface: trimesh.Trimesh, place: Place, unit: float) -> tuple[int, float]:
-    """Number of the vertex at a place, and how far it is from the point named [m]; see `locate_all`."""
+    """Number of the vertex at a place, and its distance from the point named [m]."""
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")
     if place.vertex is None:
