@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from solver.correction.correction import INTERACTIVE_TOLERANCE
+from solver.correction.criteria import INTERACTIVE_TOLERANCE
 from studies.benchmark.further import RIVALS
 from studies.benchmark.methods import (
     CORRECTED_TOLERANCE,
