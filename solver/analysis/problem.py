@@ -43,6 +43,8 @@ if TYPE_CHECKING:  # Its import takes long.
 Array = NDArray[np.float64]
 
 DISCRETISATIONS = ("voxel", "finite-cell")
+AUTO = "auto"
+"""Name of the choice that is left to the program."""
 
 
 @parameters
@@ -56,9 +58,9 @@ class ProblemOptions:
         f"{', '.join(materials.NAMES)}, or a file with one Young's modulus [Pa] per voxel",
         metavar="NAME|FILE",
     )
-    coarsen: Annotated[str, OneOf("auto", *COARSENINGS)] = option(
+    coarsen: Annotated[str, OneOf(AUTO, *COARSENINGS)] = option(
         "none",
-        f"coarsening of the blocks; auto is {FOREST} of voxels and none of finite cells",
+        f"coarsening of the blocks; {AUTO} is {FOREST} of voxels and none of finite cells",
     )
     forest: str | None = option(
         None, "forests for --coarsen ddfem (HDF5; default: those of the package)", metavar="FILE"
@@ -79,7 +81,7 @@ class ProblemOptions:
     )
 
     def __post_init__(self) -> None:
-        if self.coarsen == "auto":
+        if self.coarsen == AUTO:
             suits = FOREST if self.discretisation == "voxel" else "none"
             object.__setattr__(self, "coarsen", suits)
 

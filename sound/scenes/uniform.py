@@ -27,6 +27,7 @@ from carillon.processes.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.voxels import Reference
+from solver.analysis.problem import AUTO
 from solver.files.modes_file import read_modes, write_modes
 from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors
 from solver.response.response import Damping
@@ -39,7 +40,7 @@ Array = NDArray[np.float64]
 
 YOUNG, DENSITY = 1e9, 1000.0
 """Young's modulus [Pa] and density [kg/m^3] of the solid whose modes are computed."""
-VOXEL, FINITE_CELL, AUTO = "voxel", "finite-cell", "auto"
+VOXEL, FINITE_CELL = "voxel", "finite-cell"
 DISCRETISATIONS = (AUTO, FINITE_CELL, VOXEL)
 """Methods of discretisation; `auto` takes finite cells, or voxels if these refuse a surface."""
 _KIND, _VERSION = "modes of scenes", 1  # counted up, too, when other modes are found than before
