@@ -100,8 +100,8 @@ def _left_by_two(band: Complex) -> float:
         decays, frequencies = np.split(values, 2)
         return np.exp(np.outer(time, -np.abs(decays) + 1j * frequencies))
 
-    found = exponents_of_orders(band, (1, 2))
-    starts = [np.concatenate([np.abs(each.real), each.imag]) for each in found]
+    of_orders = exponents_of_orders(band, (1, 2))
+    starts = [np.concatenate([np.abs(each.real), each.imag]) for each in of_orders]
     return min(_fitted(band, waves, start)[0] for start in starts)
 
 
@@ -150,5 +150,5 @@ def _fitted(
         left = band - basis @ np.linalg.lstsq(basis, band, rcond=None)[0]
         return np.concatenate([left.real, left.imag])
 
-    found = least_squares(rest, start, max_nfev=_STEPS, x_scale="jac", bounds=bounds)
-    return 2.0 * float(found.cost), np.asarray(found.x)
+    fit = least_squares(rest, start, max_nfev=_STEPS, x_scale="jac", bounds=bounds)
+    return 2.0 * float(fit.cost), np.asarray(fit.x)

@@ -11,19 +11,21 @@ MOSTLY_MODES = 0.8
 
 def remarks(evidence: Mapping[str, Any]) -> list[str]:
     """Remarks, without full stops, on what is unusual in the evidence of a `ModalSound`."""
-    found = []
+    sentences = []
     if evidence["explained"] < MOSTLY_MODES:
-        found.append("the rest is noise, or tones that do not fade evenly, and no material has it")
+        sentences.append(
+            "the rest is noise, or tones that do not fade evenly, and no material has it"
+        )
     if evidence["clipped_samples"]:
-        found.append(f"{evidence['clipped_samples']} samples at full scale are left out")
+        sentences.append(f"{evidence['clipped_samples']} samples at full scale are left out")
     if evidence["second_strike_seconds"] is not None:
-        found.append(
+        sentences.append(
             f"there is another strike at {evidence['second_strike_seconds']:.2f} s, left out"
         )
     if evidence["glide"] is not None:
         bend = evidence["glide"]
-        found.append(
+        sentences.append(
             f"its loudest tone glides from {bend['cents']:+.0f} cents to {bend['hertz']:.1f} Hz "
             f"within {bend['seconds']:.2f} s, which no material does"
         )
-    return found
+    return sentences

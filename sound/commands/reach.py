@@ -67,12 +67,12 @@ def run(arguments: argparse.Namespace) -> int:
     if options.unless_fall is None or content["fall"] < options.unless_fall:
         problem = prepare(project, design.targets)
         require_same_voxels(problem, design)
-        found = reach(problem, design, options.seconds, options.descents)
-        content |= asdict(found)
+        result = reach(problem, design, options.seconds, options.descents)
+        content |= asdict(result)
     if options.json:
         print(json.dumps({**content, "provenance": measured(project.as_dict())}))
     elif "modes" in content:
-        print("\n".join(_lines(found)))
+        print("\n".join(_lines(result)))
     else:
         print(f"{options.design}: cost fell by {content['fall']:.1%}, nothing is asked")
     return 0
@@ -86,16 +86,16 @@ def _require_same_targets(options: ReachOptions, names: list[str], design: Desig
         )
 
 
-def _lines(found: Reach) -> list[str]:
+def _lines(result: Reach) -> list[str]:
     """A line for each mode, and one for all."""
     heads = ("target Hz", "cents", "alone", "beside")
     lines = ["  ".join(["mode", *(f"{head:>10}" for head in heads), "verdict"])]
-    for each in found.modes:
+    for each in result.modes:
         values = (each.cents, each.alone_cents, each.beside_cents)
         columns = [f"{each.target_hz:10.2f}", *(f"{value:10.1f}" for value in values)]
         lines.append("  ".join([f"{each.mode:4}", *columns, each.verdict]))
     lines.append(
-        f"the first {found.together} of {len(found.modes) + 1} modes were had together, amplitudes "
-        f"aside; {found.seconds:.1f} s"
+        f"the first {result.together} of {len(result.modes) + 1} modes were had together, "
+        f"amplitudes aside; {result.seconds:.1f} s"
     )
     return lines

@@ -181,21 +181,21 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
         See `coordinates_of`; or if a process died, or there are no modes to be had.
     """
     begin = time.monotonic()
-    wanted = problem.setting.objective.targets.frequencies
-    own = cents(design.frequencies / design.frequencies[0], wanted / wanted[0])
-    missed = [mode for mode in range(1, len(wanted)) if abs(own[mode]) > HAD_CENTS]
+    targets = problem.setting.objective.targets.frequencies
+    own = cents(design.frequencies / design.frequencies[0], targets / targets[0])
+    missed = [mode for mode in range(1, len(targets)) if abs(own[mode]) > HAD_CENTS]
     if not missed:
-        modes = [_judged(mode, own, wanted) for mode in range(1, len(wanted))]
-        return Reach(modes, len(wanted), time.monotonic() - begin)
+        modes = [_judged(mode, own, targets) for mode in range(1, len(targets))]
+        return Reach(modes, len(targets), time.monotonic() - begin)
     limit = np.inf if seconds is None else seconds
     with _Descents(problem, descents) as search:
         search.look_at(
             [coordinates_of(problem, design), *_samples(problem.setting.material.dimensions)]
         )
         together = search.together(begin + 0.5 * limit)
-        groups = [group for mode in missed for group in ((mode,), _beside(mode, len(wanted)))]
+        groups = [group for mode in missed for group in ((mode,), _beside(mode, len(targets)))]
         search.approach(list(dict.fromkeys(groups)), begin + limit)
-    modes = [_judged(mode, own, wanted, search) for mode in range(1, len(wanted))]
+    modes = [_judged(mode, own, targets, search) for mode in range(1, len(targets))]
     return Reach(modes, together, time.monotonic() - begin)
 
 
@@ -290,15 +290,15 @@ def _beside(mode: int, count: int) -> tuple[int, ...]:
     return tuple(range(max(1, mode - 1), min(count, mode + 2)))
 
 
-def _judged(mode: int, own: Array, wanted: Array, search: _Descents | None = None) -> ModeReach:
+def _judged(mode: int, own: Array, targets: Array, search: _Descents | None = None) -> ModeReach:
     alone = beside = 0.0
     verdict = HAD
     if search is not None and abs(own[mode]) > HAD_CENTS:
-        neighbours = _beside(mode, len(wanted))
+        neighbours = _beside(mode, len(targets))
         alone, beside = search.known.least((mode,)), search.known.least(neighbours)
         verdict = NOT_TOGETHER
         if beside > HAD_CENTS:
             verdict = NOT_BESIDE if neighbours in search.sought else NOT_SOUGHT
         if alone > HAD_CENTS:
             verdict = NOT_ALONE if (mode,) in search.sought else NOT_SOUGHT
-    return ModeReach(mode + 1, float(wanted[mode]), float(own[mode]), alone, beside, verdict)
+    return ModeReach(mode + 1, float(targets[mode]), float(own[mode]), alone, beside, verdict)

@@ -57,10 +57,10 @@ class HeardSolid:
             places = self.places((name, point) for point, name in points.items())
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
-        found = dict(zip(points, places, strict=True))
+        place_of = dict(zip(points, places, strict=True))
         hits = []
         for strike in strikes:
-            position, inward, distance = found[strike.point]
+            position, inward, distance = place_of[strike.point]
             impulse = (strength if strike.strength is None else strike.strength) * inward
             hits.append(Hit(strike.seconds, position, impulse, distance))
         return hits
@@ -128,7 +128,7 @@ def _places_of_design(design: Design) -> Places:
         from sound.strikes import Place, vertex_of
 
         surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
-        found: list[tuple[Array, Array, float] | None] = []
+        struck_places: list[tuple[Array, Array, float] | None] = []
         vertices, distances = [], []
         for name, point in points:
             if point.target is None:
@@ -136,9 +136,9 @@ def _places_of_design(design: Design) -> Places:
                 vertex, distance = vertex_of(surface, place, design.unit)
                 vertices.append(vertex)
                 distances.append(distance)
-                found.append(None)
+                struck_places.append(None)
             elif point.target in targets:
-                found.append(targets[point.target])
+                struck_places.append(targets[point.target])
             else:
                 raise UserError(
                     f"{name}: the design has no target {point.target!r}, expected one of "
@@ -147,7 +147,7 @@ def _places_of_design(design: Design) -> Places:
         positions = design.surface_vertices[vertices]
         inward = inward_normals(surface, positions) if vertices else positions
         struck = zip(positions, inward, distances, strict=True)
-        return [next(struck) if place is None else place for place in found]
+        return [next(struck) if place is None else place for place in struck_places]
 
     return places
 
@@ -162,7 +162,7 @@ def _places_of_model(model: Solid) -> Places:
         surface = surface_of(model)
         longest = float(np.ptp(surface.points, axis=0).max())
         reach = max(TOO_FAR * longest, REACH * surface.edge)
-        found = []
+        struck = []
         for name, point in points:
             if point.at is None:
                 raise UserError(
@@ -170,7 +170,7 @@ def _places_of_model(model: Solid) -> Places:
                     "strike it --at a point, or name its design by --like"
                 )
             position, inward = surface.place(np.array(point.at), name, reach)
-            found.append((position, inward, float(np.linalg.norm(position - point.at))))
-        return found
+            struck.append((position, inward, float(np.linalg.norm(position - point.at))))
+        return struck
 
     return places

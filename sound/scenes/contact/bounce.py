@@ -37,8 +37,8 @@ def damping_ratio(restitution: float, steps: int) -> float:
         return 0.0
     if restitution <= restitution_of(MOST_DAMPED, steps):
         return MOST_DAMPED
-    found = brentq(lambda ratio: restitution_of(ratio, steps) - restitution, 0.0, MOST_DAMPED)
-    return float(found)
+    ratio = brentq(lambda each: restitution_of(each, steps) - restitution, 0.0, MOST_DAMPED)
+    return float(ratio)
 
 
 def restitution_of(ratio: float, steps: int) -> float:

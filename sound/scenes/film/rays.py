@@ -127,15 +127,15 @@ class RayedSurface:
 
     def meet(self, origins: Floats, directions: Floats) -> Meetings:
         """First intersections with rays (n, 3)."""
-        found = self._scene.run(origins, directions, output=1)
-        rays = np.flatnonzero(found["primID"] >= 0)
-        u, v, faces, outwards = (found[key][rays] for key in ("u", "v", "primID", "Ng"))
+        hits = self._scene.run(origins, directions, output=1)
+        rays = np.flatnonzero(hits["primID"] >= 0)
+        u, v, faces, outwards = (hits[key][rays] for key in ("u", "v", "primID", "Ng"))
         shares = np.stack([1.0 - u - v, u, v], axis=1)
         normals = np.einsum("ij,ijk->ik", shares, self.normals[faces])
         inside = np.einsum("ij,ij->i", outwards, directions[rays]) > 0.0
         normals[inside] *= -1.0
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return Meetings(rays, found["tfar"][rays], normals)
+        return Meetings(rays, hits["tfar"][rays], normals)
 
     def hides(self, origins: Floats, directions: Floats) -> Flags:
         """Which rays (n,) hit the surface."""
