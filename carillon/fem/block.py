@@ -117,6 +117,17 @@ def active_nodes(filled: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.unique(CELL_NODES[filled])
 
 
+def void_patterns(young: Array) -> NDArray[np.int64]:
+    """Void patterns (n,) of blocks (n, 8), or that of one block (8,): bit j if cell j is filled.
+
+    Examples
+    --------
+    >>> void_patterns(np.array([[1.0, 2, 0, 0, 0, 0, 0, 3], [0, 1, 0, 0, 0, 0, 0, 0]])).tolist()
+    [131, 2]
+    """
+    return np.asarray((young > 0.0) @ (1 << np.arange(8)))
+
+
 @cache
 def symmetries() -> NDArray[np.int64]:
     """The cube's 48 symmetries as permutations (48, 8): row g sends cell j to [g, j]."""

@@ -1,7 +1,7 @@
 """Fit objectives by name: eight fine moduli of a block -> eight coarse moduli of one element.
 
 Every objective is homogeneous of degree one in the fine moduli and equivariant under the cube's 48
-symmetries. Each lives in a module of its own with a function `fit_pattern`.
+symmetries. Each lives in the module of its name, with a function `fit_pattern`.
 
 The names are here; what fits by them, in `fitting`, takes a while to load.
 """
@@ -47,7 +47,7 @@ OBJECTIVES = (
     "factored",
     "calibrated",
 )
-"""Names of all objectives."""
+"""Names of all objectives, each that of its module."""
 
 SAMPLED = "sampled-energy"
 """`energy` by its printed evaluator, forces drawn anew for every sample of a dataset.

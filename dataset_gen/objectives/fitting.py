@@ -2,41 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
+from importlib import import_module
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from carillon.errors import UserError
-from carillon.fem.block import pattern_images, symmetries
+from carillon.fem.block import pattern_images, symmetries, void_patterns
 from carillon.fem.element import DEFAULT_POISSON, Array
 from dataset_gen.objectives import (
     SAMPLED,
-    calibrated,
-    chen2015,
-    energy,
-    factored,
-    hybrid,
-    inertial,
-    oversampled,
     require_objective,
     require_poisson,
     sampled_energy,
 )
-from dataset_gen.objectives.quadratic import PatternFits
 
-FITS: dict[str, Callable[[Array, int, float], PatternFits]] = {
-    "energy": energy.fit_pattern,
-    "chen2015": chen2015.fit_pattern,
-    "inertial": inertial.fit_pattern,
-    "oversampled": oversampled.fit_pattern,
-    "hybrid": hybrid.fit_pattern,
-    "factored": factored.fit_pattern,
-    "calibrated": calibrated.fit_pattern,
-}
-"""What fits blocks of one void pattern, by the name of the objective."""
+
+def module_of(objective: str) -> ModuleType:
+    """Module of an objective, whose `fit_pattern` fits blocks (n, 8) of one void pattern."""
+    return import_module(f"dataset_gen.objectives.{objective}")
 
 
 class Fits(NamedTuple):
@@ -111,7 +98,7 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     young = np.ascontiguousarray(e, dtype=float)
     _require_blocks(young)
     images, turns = orientations()
-    masks = (young > 0.0) @ (1 << np.arange(8))
+    masks = void_patterns(young)
     turn, image = turns[masks], images[masks]
     turned = np.empty_like(young)
     np.put_along_axis(turned, turn, young, axis=1)
@@ -120,7 +107,7 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     converged = np.empty(len(young), dtype=bool)
     for mask in np.unique(image):
         rows = np.flatnonzero(image == mask)
-        fits = FITS[objective](turned[rows], int(mask), float(poisson))
+        fits = module_of(objective).fit_pattern(turned[rows], int(mask), float(poisson))
         moduli[rows], residual[rows], converged[rows] = fits
     return Fits(np.take_along_axis(moduli, turn, axis=1), residual, converged)
 

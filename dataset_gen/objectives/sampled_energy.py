@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from carillon.fem.block import void_patterns
 from carillon.fem.element import DEFAULT_POISSON, Array
 from carillon.numerics.simd import LANES, add_product, empty, load, spread, store, store_tile, zeros
 from carillon.processes.threads import blas_threads
@@ -89,15 +90,10 @@ def draw_forces(young: Array, directions: int, generator: np.random.Generator) -
 
     Multiplied by independent chi-distributed lengths they would be Gaussian.
     """
-    pattern = pattern_of(mask_of(young), DEFAULT_POISSON)
+    pattern = pattern_of(int(void_patterns(young)), DEFAULT_POISSON)
     gaussian = generator.standard_normal((len(pattern.dofs), directions))
     forces = pattern.without_null(gaussian)
     return np.asarray(forces / np.linalg.norm(forces, axis=0))
-
-
-def mask_of(young: Array) -> int:
-    """Void pattern of the block `young` (8,)."""
-    return int((young > 0) @ (1 << np.arange(8)))
 
 
 @compiled
@@ -231,7 +227,7 @@ def fit_block(
     Both meshes are solved for each direction at each magnitude, and the squared differences of all
     these energies are summed, as the paper says.
     """
-    mask, largest = mask_of(young), young.max()
+    mask, largest = int(void_patterns(young)), young.max()
     scaled = (young / largest)[None]
     order = pattern_of(mask, poisson).positions(elimination_of(mask).dofs)
     forces = draw_forces(young, directions, generator)

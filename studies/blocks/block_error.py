@@ -40,6 +40,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.fem.block import void_patterns
 from carillon.fem.element import Array
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.chen2015 import corner_selection
@@ -199,13 +200,9 @@ def coarse_flexibility(moduli: Array, poisson: float) -> Array:
     return np.asarray(np.linalg.inv(matrices))
 
 
-def _masks(young: Array) -> NDArray[np.int64]:
-    return np.asarray((young > 0.0) @ (1 << np.arange(8)))
-
-
 def pattern_rows(young: Array, at_most: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
     """Void patterns of blocks (n, 8) and the rows of each, up to `at_most` together."""
-    masks = _masks(young)
+    masks = void_patterns(young)
     for mask in np.unique(masks):
         rows = np.flatnonzero(masks == mask)
         for first in range(0, len(rows), at_most):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from carillon.fem.block import void_patterns
 from carillon.fem.element import Array
 from dataset_gen.objectives import orientations
 from dataset_gen.sampling import Mixture, Moduli, moduli, samples
@@ -100,7 +101,7 @@ CASES = (
 
 def turned(young: Array) -> Array:
     """Blocks (n, 8), each turned by a symmetry of the cube to the least image of its pattern."""
-    turn = orientations()[1][(young > 0.0) @ (1 << np.arange(8))]
+    turn = orientations()[1][void_patterns(young)]
     images = np.empty_like(young)
     np.put_along_axis(images, turn, young, axis=1)
     return images

@@ -10,7 +10,6 @@ from studies.base.command_results import add_outputs, publish
 from studies.blocks import table
 from studies.blocks.cases import CASES
 from studies.blocks.methods import common_poisson, databases_of, load_models
-from studies.blocks.plot import plot
 
 EXAMPLES = """examples:
   table
@@ -36,5 +35,7 @@ def run(arguments: argparse.Namespace) -> None:
     databases = databases_of(CASES, poisson, arguments.database, options.materials)
     rows = table.table(models, options, databases)
     if arguments.plot:
+        from studies.blocks.plot import plot  # matplotlib takes a while to load
+
         plot(rows, arguments.plot)
     publish(arguments, rows, table.as_text(rows), threads=1)

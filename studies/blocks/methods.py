@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -64,33 +65,25 @@ class Method:
 
 def direct_fit(objective: str, poisson: float) -> Method:
     """The fit of an objective to every block on the spot."""
-
-    def moduli(young: Array) -> Array:
-        return fit(objective, young, poisson).moduli
-
-    return Method(f"{objective}, fitted on the spot", moduli)
+    return Method(
+        f"{objective}, fitted on the spot", lambda young: fit(objective, young, poisson).moduli
+    )
 
 
 def static_condensation(poisson: float) -> Method:
     """Condensation to the corners, with a dense stiffness for every block."""
-
-    def stiffness(young: Array) -> Array:
-        return condense(young, poisson)
-
-    def flexibility(young: Array) -> Array:
-        return corner_flexibility(young, poisson)
-
-    return Method("static condensation", stiffness, flexibility=flexibility)
+    return Method(
+        "static condensation",
+        partial(condense, poisson=poisson),
+        flexibility=partial(corner_flexibility, poisson=poisson),
+    )
 
 
 def trained(name: str, model: Model) -> Method:
     """Regression forests."""
-
-    def moduli(young: Array) -> Array:
-        return coarsen(model, young)
-
     seconds = {**model.provenance, **model.scores}.get("training_seconds")
-    return Method(name, moduli, model.nbytes, None if seconds is None else float(seconds))
+    training = None if seconds is None else float(seconds)
+    return Method(name, partial(coarsen, model), model.nbytes, training)
 
 
 def methods_of(models: dict[str, Model]) -> list[Method]:
@@ -120,11 +113,8 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
 
 def metamaterials(database: Database, name: str, clamped: bool = False) -> Method:
     """Lookup in a database of metamaterials [GPa]."""
-
-    def moduli(young: Array) -> Array:
-        return look_up(database, young)
-
-    return Method(name, moduli, database.nbytes, database.seconds, clamped=clamped)
+    lookup = partial(look_up, database)
+    return Method(name, lookup, database.nbytes, database.seconds, clamped=clamped)
 
 
 def databases_of(

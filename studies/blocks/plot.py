@@ -6,61 +6,89 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
 from carillon.command_line.picture_formats import require_plottable
 from carillon.files.atomic import atomic_path
+from studies.base.colours import COLOURS, MUTED
+from studies.base.entry import Row
+from studies.base.style import plain_numbers
+from workflow.report.blocks_tables import compared, kind_of, kinds_of, method_of
 
-MARKERS = "osD^vP*X<>h8"
+MARKS: tuple[tuple[str, str], ...] = (
+    ("o", COLOURS["hcms"]),
+    ("s", COLOURS["hcms"]),
+    ("^", COLOURS["ddfem_slepc"]),
+    ("D", COLOURS["random"]),
+    ("v", COLOURS["random"]),
+    ("P", COLOURS["hcms_ec"]),
+    ("X", COLOURS["truth"]),
+    ("<", COLOURS["ddfem_slepc"]),
+)
+"""Markers and colours of the coarsenings, in their order; forests have `FOREST_MARK`."""
 
-PANEL_INCHES = (4.2, 3.4)
+FOREST_MARK = ("*", COLOURS["ddfem_hcms_ec"])
 
 
-def _case(row: dict[str, Any]) -> tuple[str, str]:
-    low, high = row["range_gpa"]
-    return f"{low:g}..{high:g} GPa, {row['distribution']}", row["fill"]
+def plot(rows: Sequence[Row], path: str | Path) -> None:
+    """Write the picture on white; the ending of `path` decides the format."""
+    path = require_plottable(path)
+    figure = error_over_cost(rows)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=150, facecolor="white")
+    plt.close(figure)
 
 
-def plot(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
-    """Write a panel for each case, mean error under nodal forces over cost, both axes logarithmic.
+def error_over_cost(rows: Sequence[Row]) -> Figure:
+    """Mean error under nodal forces over cost, both axes logarithmic, a panel a kind of blocks.
 
-    Cases that only scale others are left out, as their errors are the same, and so are methods
+    Kinds that only scale others are left out, as their errors are the same, and so are methods
     beyond the range that they were made for, as their errors are many thousand times larger.
     """
-    from matplotlib.figure import Figure  # slow to import, and only needed here
-    from matplotlib.ticker import FormatStrFormatter
-
-    path = require_plottable(path)
-    shown = [row for row in rows if row["scaled_by"] == 1.0 and not row["clamped"]]
-    cases = list(dict.fromkeys(_case(row) for row in shown))
-    names = list(dict.fromkeys(row["method"] for row in shown))
-    across = min(2, len(cases))
-    down = -(-len(cases) // across)
-    size = (PANEL_INCHES[0] * across, PANEL_INCHES[1] * down + 0.3 * (len(names) + 2) / 2)
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
-    for axis in axes.flat[len(cases) :]:
+    rows = compared(rows)
+    kinds = kinds_of(rows)
+    marks = _marks(list(dict.fromkeys(map(method_of, rows))))
+    figure, axes = plt.subplots(
+        -(-len(kinds) // 2),
+        2,
+        figsize=(7.6, 1.2 + 1.45 * len(kinds)),
+        sharex=True,
+        sharey=True,
+        squeeze=False,
+    )
+    for axis in axes.flat[len(kinds) :]:
         axis.set_visible(False)
-    marks = {}
-    for axis, case in zip(axes.flat, cases):
-        for row in (row for row in shown if _case(row) == case):
-            number = names.index(row["method"])
-            marks[row["method"]] = axis.scatter(
-                1e6 * row["seconds_per_block"],
-                row["mean_error"],
-                marker=MARKERS[number % len(MARKERS)],
-                color=f"C{number % 10}",
-                s=60,
-                zorder=3,
-            )
-        minimum = next(row["min_mean_error"] for row in shown if _case(row) == case)
-        marks["least of any element"] = axis.axhline(minimum, color="0.4", linestyle="--", zorder=2)
-        axis.set(xscale="log", yscale="log", title=", ".join(case))
-        axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-        axis.yaxis.set_minor_formatter(FormatStrFormatter("%g"))
-        axis.grid(True, which="both", color="0.9", zorder=0)
+    for axis, kind in zip(axes.flat, kinds):
+        _panel(axis, [row for row in rows if kind_of(row) == kind], marks)
+        axis.set_title(kind)
     for axis in axes[-1]:
         axis.set_xlabel("cost per block [µs], one core")
     for axis in axes[:, 0]:
-        axis.set_ylabel("mean of E|u_c − u|² / E|u|²")
-    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=2)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=150)
+        axis.set_ylabel("E|u_c − u|² / E|u|²")
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=3, columnspacing=1.2)
+    return figure
+
+
+def _marks(methods: Sequence[str]) -> dict[str, tuple[str, str]]:
+    others = iter(MARKS * (1 + len(methods) // len(MARKS)))
+    return {name: FOREST_MARK if "forests" in name else next(others) for name in methods}
+
+
+def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) -> None:
+    for row in rows:
+        marker, colour = marks[method_of(row)]
+        axis.plot(
+            1e6 * row["seconds_per_block"],
+            row["mean_error"],
+            marker,
+            color=colour,
+            markersize=9 if marker == FOREST_MARK[0] else 5.5,
+            linestyle="none",
+            label=method_of(row),
+        )
+    least = rows[0]["min_mean_error"]
+    axis.axhline(least, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="least of any")
+    axis.set(xscale="log", yscale="log")
+    plain_numbers(axis.yaxis)

@@ -28,5 +28,7 @@ def run(arguments: argparse.Namespace) -> None:
     counts = training.require_counts(arguments.rows)
     rows = training.learning_curve(dataset, how, counts, arguments.workers)
     if arguments.plot:
-        training.error_over_rows(rows, arguments.plot)
+        from studies.forests.plots import save_curve  # matplotlib takes a while to load
+
+        save_curve(rows, arguments.plot)
     publish(arguments, rows, training.as_text(rows), arguments.workers)

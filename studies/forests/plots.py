@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from carillon.files.atomic import atomic_path
 from studies.base.colours import COLOURS, MUTED
 from studies.base.entry import Row
 from studies.base.style import named_rows, plain_numbers
+from studies.blocks.plot import error_over_cost
 from studies.forests.results import ForestsStudy
-from workflow.report.blocks_tables import compared, kind_of, kinds_of, method_of
-
-MARKS: tuple[tuple[str, str], ...] = (
-    ("o", COLOURS["hcms"]),
-    ("s", COLOURS["hcms"]),
-    ("^", COLOURS["ddfem_slepc"]),
-    ("D", COLOURS["random"]),
-    ("v", COLOURS["random"]),
-    ("P", COLOURS["hcms_ec"]),
-    ("X", COLOURS["truth"]),
-    ("<", COLOURS["ddfem_slepc"]),
-)
-"""Markers and colours of the coarsenings, in their order; forests have `FOREST_MARK`."""
-
-FOREST_MARK = ("*", COLOURS["ddfem_hcms_ec"])
 
 DISTRIBUTIONS = (COLOURS["hcms_ec"], COLOURS["ddfem_hcms_ec"], COLOURS["ddfem_slepc"])
 """Colours of the distributions that forests are scored on."""
@@ -43,51 +29,24 @@ SIZED = {"random": "random blocks", "coherent": "blocks of a mesh"}
 
 def blocks_figure(study: ForestsStudy) -> Figure:
     """Error over cost of every coarsening, a panel a kind of blocks (Fig. 9)."""
-    rows = compared(study.result("blocks"))
-    kinds = kinds_of(rows)
-    marks = _marks(list(dict.fromkeys(map(method_of, rows))))
-    figure, axes = plt.subplots(
-        -(-len(kinds) // 2), 2, figsize=(7.6, 1.2 + 1.45 * len(kinds)), sharex=True, sharey=True
-    )
-    for axis, kind in zip(axes.flat, kinds):
-        _panel(axis, [row for row in rows if kind_of(row) == kind], marks)
-        axis.set_title(kind)
-    for axis in axes[-1]:
-        axis.set_xlabel("cost per block [µs], one core")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("E|u_c − u|² / E|u|²")
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=3, columnspacing=1.2)
-    return figure
-
-
-def _marks(methods: Sequence[str]) -> dict[str, tuple[str, str]]:
-    others = iter(MARKS * (1 + len(methods) // len(MARKS)))
-    return {name: FOREST_MARK if "forests" in name else next(others) for name in methods}
-
-
-def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) -> None:
-    for row in rows:
-        marker, colour = marks[method_of(row)]
-        microseconds = 1e6 * row["seconds_per_block"]
-        axis.plot(
-            microseconds,
-            row["mean_error"],
-            marker,
-            color=colour,
-            markersize=9 if marker == FOREST_MARK[0] else 5.5,
-            linestyle="none",
-            label=method_of(row),
-        )
-    least = rows[0]["min_mean_error"]
-    axis.axhline(least, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="least of any")
-    axis.set(xscale="log", yscale="log")
-    plain_numbers(axis.yaxis)
+    return error_over_cost(study.result("blocks"))
 
 
 def curve_figure(study: ForestsStudy) -> Figure:
     """Errors on fresh blocks over the rows trained on."""
-    rows = study.result("curve")
+    return error_over_rows(study.result("curve"))
+
+
+def save_curve(rows: Sequence[Row], path: str) -> None:
+    """Write a learning curve on white; the ending of `path` decides the format."""
+    figure = error_over_rows(rows)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, facecolor="white")
+    plt.close(figure)
+
+
+def error_over_rows(rows: Sequence[Row]) -> Figure:
+    """Errors of a learning curve on fresh blocks, both axes logarithmic."""
     figure, axes = plt.subplots(figsize=(7.6, 4.2))
     for distribution, colour in zip(rows[0]["scores"], DISTRIBUTIONS):
         for key, label, look in PARTS:

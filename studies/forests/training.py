@@ -11,7 +11,6 @@ import numpy as np
 
 from carillon.errors import UserError
 from carillon.fem.element import Array
-from carillon.files.atomic import atomic_path
 from carillon.parameters.quantities import LARGEST
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
@@ -169,29 +168,6 @@ def as_text(rows: Sequence[Row]) -> str:
             f"{row['training_seconds']:>8.1f}  {scores}"
         )
     return "\n".join(lines)
-
-
-def error_over_rows(rows: Sequence[Row], path: str) -> None:
-    """Plot a learning curve."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
-    for name in rows[0]["scores"]:
-        for score, label, line in (
-            ("rms_log_solid", "solid", "-o"),
-            ("rms_log_partly_void", "partly void", "--s"),
-        ):
-            values = [row["scores"][name][score] for row in rows]
-            axes.loglog([row["rows"] for row in rows], values, line, label=f"{name}, {label}")
-    axes.set(xlabel="training rows", ylabel="rms error of log E on fresh samples")
-    axes.grid(True, which="both", alpha=0.3)
-    axes.legend()
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary)
-    plt.close(figure)
 
 
 def require_counts(text: str) -> list[int]:

@@ -11,7 +11,7 @@ import pandas as pd
 
 import carillon.fem.materials
 from carillon.fem.model import RIGID_MODES
-from dataset_gen.objectives.fitting import FITS
+from dataset_gen.objectives.fitting import module_of
 from solver.coarsening.forest import FOREST
 from studies.base.cases import Case
 from studies.base.entry import Row
@@ -125,7 +125,7 @@ def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str
             f"No fit: regression forests that have learned {forest['forest_objective']}; "
             f"{forest['forest']}, SHA-256 {forest['forest_sha256']}…"
         )
-    first = _first_line(inspect.getmodule(FITS[coarsening]))
+    first = _first_line(module_of(coarsening))
     text = first.removeprefix(f"Objective `{coarsening}`:").replace("`", "").strip()
     return text[:1].upper() + text[1:]
 
