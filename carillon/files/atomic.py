@@ -1,17 +1,23 @@
-"""Files that are complete or absent: written aside, flushed to disk, then renamed."""
+"""Files that are complete or absent: written aside, flushed to disk, then renamed.
+
+What killed writers leave under temporary names is removed by the next one.
+"""
 
 from __future__ import annotations
 
 import fcntl
 import os
+import stat
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from carillon.errors import UserError
-from carillon.files.leftovers import remove_leftovers, temporary_name
 from carillon.files.paths import cause, require_writable, target_of
+
+LONGEST_ENDING = 10
+"""Longest ending of a file's name in characters that a temporary name keeps."""
 
 
 @contextmanager
@@ -78,16 +84,42 @@ def _new_temporary(path: Path) -> tuple[int, Path]:
         os.close(handle)  # another writer took it for a leftover, before it was locked
 
 
-def by_stem(paths: Iterable[str | Path]) -> dict[str, str]:
-    """Names of files by their stems, or by themselves where stems are equal.
+def temporary_name(name: str) -> tuple[str, str]:
+    """Beginning and end of the temporary names of a file called `name`.
 
     Examples
     --------
-    >>> by_stem(["a/bell.h5", "a/pan.h5"])
-    {'bell': 'a/bell.h5', 'pan': 'a/pan.h5'}
-    >>> by_stem(["a/bell.h5", "b/bell.h5"])
-    {'a/bell.h5': 'a/bell.h5', 'b/bell.h5': 'b/bell.h5'}
+    >>> temporary_name("pan.yaml")
+    ('.pan.yaml.', '.partial.yaml')
     """
-    names = list(dict.fromkeys(map(str, paths)))
-    stems = [Path(name).stem for name in names]
-    return dict(zip(stems if len(set(stems)) == len(stems) else names, names, strict=True))
+    suffix = PurePath(name).suffix
+    return f".{name}.", f".partial{suffix if len(suffix) <= LONGEST_ENDING else ''}"
+
+
+def remove_leftovers(folder: int, name: str) -> None:
+    """Remove temporary files of `name` that nobody holds a lock on.
+
+    Regular files alone are opened: links, pipes and devices of such names are somebody else's.
+
+    Parameters
+    ----------
+    folder
+        Descriptor of the folder that they are in.
+    """
+    start, end = temporary_name(name)
+    for other in os.listdir(folder):
+        if other.startswith(start) and other.endswith(end):
+            with suppress(OSError):
+                _remove_unlocked(folder, other)
+
+
+def _remove_unlocked(folder: int, name: str) -> None:
+    if not stat.S_ISREG(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode):
+        return
+    flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    file = os.open(name, flags, dir_fd=folder)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.unlink(name, dir_fd=folder)
+    finally:
+        os.close(file)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO
 
 from carillon.errors import UserError
-from carillon.files.leftovers import remove_leftovers, temporary_name
+from carillon.files.atomic import remove_leftovers, temporary_name
 from carillon.files.paths import cause, kind_of_mode, require_plain
 
 _MISSING = 0

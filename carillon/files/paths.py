@@ -159,3 +159,18 @@ def target_of(path: Path) -> Path:
 def kind_of_mode(mode: int) -> str:
     """What something is that is no regular file, in a word: "folder", "link", "pipe"."""
     return next(name for is_such, name in _OTHER_KINDS if is_such(mode))
+
+
+def by_stem(paths: Iterable[str | Path]) -> dict[str, str]:
+    """Names of files by their stems, or by themselves where stems are equal.
+
+    Examples
+    --------
+    >>> by_stem(["a/bell.h5", "a/pan.h5"])
+    {'bell': 'a/bell.h5', 'pan': 'a/pan.h5'}
+    >>> by_stem(["a/bell.h5", "b/bell.h5"])
+    {'a/bell.h5': 'a/bell.h5', 'b/bell.h5': 'b/bell.h5'}
+    """
+    names = list(dict.fromkeys(map(str, paths)))
+    stems = [Path(name).stem for name in names]
+    return dict(zip(stems if len(set(stems)) == len(stems) else names, names, strict=True))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from carillon.errors import UserError
-from carillon.files.atomic import by_stem
+from carillon.files.paths import by_stem
 from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.files.modes_file import ModesFile, read_modes
 from solver.verification.evidence import ModesEvidence, measure_evidence
@@ -35,7 +35,7 @@ class Audit(ModesEvidence):
 def audit_files(
     paths: Iterable[str | Path], tolerance: float = EIGENVALUE_TOLERANCE
 ) -> dict[str, Audit]:
-    """Audits of modes files, see `carillon.files.atomic.by_stem` for their names.
+    """Audits of modes files, see `carillon.files.paths.by_stem` for their names.
 
     The eigenvalues were computed to the `tolerance`.
 

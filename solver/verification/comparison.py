@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.geometry import blocks_with_coarse, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
-from carillon.files.atomic import by_stem
+from carillon.files.paths import by_stem
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
 from solver.response.points import interpolation
@@ -97,7 +97,7 @@ def compare_each(
 ) -> dict[str, SpectrumComparison]:
     """Compare several modes files with one that is taken for the truth.
 
-    See `carillon.files.atomic.by_stem` for the names of the comparisons.
+    See `carillon.files.paths.by_stem` for the names of the comparisons.
 
     Raises
     ------
