@@ -119,6 +119,7 @@ class SolverOptions:
         """Whether approximate modes are corrected, and to a tolerance."""
         return self.corrections > 0 and self.tolerance != 0.0
 
+    @on_all_ranks()
     def with_method(self, n_dofs: int) -> SolverOptions:
         """The same with a method for `auto`: the fastest of those that the other options allow.
 
