@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from carillon.errors import UserError, on_all_ranks
+from carillon.errors import UserError
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from solver.analysis.options import SolverOptions
@@ -31,7 +31,6 @@ class DistanceOptions:
         "(default: unless a mesh is coarsened, or for slepc and arpack)",
     )
 
-    @on_all_ranks()
     def is_estimated(self, solid: ProblemOptions, solver: SolverOptions) -> bool:
         """Whether the distance from the solid is estimated.
 

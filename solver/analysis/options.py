@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-from carillon.errors import UserError
+from carillon.errors import UserError, on_all_ranks
 from carillon.parameters import Check, OneOf, option, parameters
 from carillon.parameters.quantities import Number, NumberOfModes, between
 from solver import linear

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from carillon.errors import UserError, on_all_ranks
+from carillon.errors import UserError
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from solver.coarsening.forest import FOREST
@@ -28,7 +28,6 @@ class RefinementOptions:
         metavar="ERROR",
     )
 
-    @on_all_ranks()
     def tolerance(
         self, coarsen: str, discretisation: str = "voxel", estimated: bool = True
     ) -> float | None:
