@@ -22,7 +22,7 @@ from carillon.parameters.quantities import Count, NonNegative, PoissonRatio, Pos
 from sound.clips.instruments import note_hertz
 from sound.project.project import project_of
 from studies.forests.training import require_counts
-from studies.scaling.study import rank_counts
+from studies.scaling.runs import rank_counts
 from tests.hostile.fuzzing import damaged, examples, or_refused, values, yaml_texts
 from tests.hostile.zoo import CONFIGURATION, PROJECT
 from workflow.commands.validate import _tolerance

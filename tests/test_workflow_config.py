@@ -22,7 +22,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
 from studies.benchmark.options import BenchmarkOptions
-from studies.scaling.study import ScalingOptions
+from studies.scaling.runs import ScalingOptions
 from tests.configuration_keys import every_key, every_value
 from workflow import settings, solids
 from workflow.configuration.whole import completed, limits
@@ -215,8 +215,19 @@ def test_built_in_solids_are_known_without_loading_what_makes_them():
     with pytest.raises(UserError) as error:
         builtin_surface("gong")
     assert str(error.value).endswith(f"expected one of {', '.join(BUILTIN_NAMES)}")
-    program = "import sys, workflow.settings; assert not {'trimesh', 'numba'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_planning_loads_no_library_that_computes():
+    """Every job of a cluster plans before it begins."""
+    program = (
+        "import sys; from studies.base import catalogue; from workflow import settings\n"
+        f"settings.complete([{str(CONFIGS / 'tiny.yaml')!r}]); catalogue.all_studies()\n"
+        "print({'petsc4py', 'numba', 'trimesh', 'mpi4py.MPI', 'matplotlib'} & set(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=True, capture_output=True, text=True
+    )
+    assert done.stdout == "set()\n"
 
 
 @pytest.mark.parametrize("section", ["", *solids.studied(load("laptop"))])

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Ge, Le, MinLen
 
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.sentences import ParameterError
-from forests.training.variants import VARIANTS
 from workflow.configuration.forests import BaseMaterials, Blocks, Leaves, Rows, Shards
 from workflow.configuration.resources import JobLimits
 from workflow.configuration.run import Configuration
 from workflow.configuration.section import File, Several
 
+VARIANTS: dict[str, dict[str, Any]] = {
+    "ratios, variance splits (paper)": {"transform": "ratio", "grower": "best"},
+    "ratios, log target": {"transform": "ratio-log", "grower": "best"},
+    "bounded ratios, log target": {"transform": "bounded", "grower": "best"},
+    "logarithms": {"grower": "best"},
+    "logarithms, extra-trees": {"grower": "extra"},
+    "ratios, log target, linear splits": {"transform": "ratio-log"},
+    "bounded ratios, linear splits": {"transform": "bounded"},
+    "logarithms, linear splits": {},
+    "the same, 1 tree": {"trees": 1},
+    "the same, 6 trees": {"trees": 6},
+}
+"""Trainings that are compared, as what they change of the default one."""
 CurveRows = Annotated[
     Several[Annotated[int, Ge(1000), Le(100_000_000_000)]],
     MinLen(2),

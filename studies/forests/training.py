@@ -5,25 +5,27 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from carillon.errors import UserError
 from carillon.fem.element import Array
+from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import LARGEST
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
 from forests.layout import NODE
 from forests.model import RECORD
+from forests.scaling import TRANSFORMS
 from forests.training.dataset import Dataset, Samples, dataset_of, joined
 from forests.training.leaves import answers_of
 from forests.training.ranks import Ranks
-from forests.training.rows import modulus_over_scale, rows_of
+from forests.training.rows import STUDIED, modulus_over_scale, rows_of
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
 from forests.training.train import Trained, TrainingOptions, train_trees
-from forests.training.variants import VARIANTS, VariantOptions
+from studies.forests.config import VARIANTS
 
 logger = logging.getLogger(__name__)
 
@@ -34,6 +36,13 @@ LEAST_RATIO = 1e-12
 """A regression of ratios may answer 0 or less, which has no logarithm: this is taken instead."""
 
 Row = dict[str, Any]
+
+
+@parameters
+class VariantOptions(TrainingOptions):
+    """Parameters of a training that is compared, which may have transforms of no evaluator."""
+
+    transform: Annotated[str, OneOf(*TRANSFORMS, *STUDIED)] = option("log")
 
 
 def fresh_samples(dataset: Dataset) -> dict[str, Samples]:

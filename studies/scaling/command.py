@@ -19,7 +19,7 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
 from solver.distribution.collective import compute_on_root
 from studies.scaling.measure import measure
-from studies.scaling.study import ScalingOptions, scaling_study, study_lines
+from studies.scaling.runs import ScalingOptions, scaling_study, study_lines
 
 EXAMPLES = """example:
   scaling builtin:bell --resolution 40 --ranks 1,2,4 --plot scaling.svg

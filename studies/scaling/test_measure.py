@@ -24,7 +24,7 @@ from studies.scaling.model import (
     kind,
 )
 from studies.scaling.plot import save_plot
-from studies.scaling.study import PREDICTED, growing_trees, study_lines, trees_of_solid
+from studies.scaling.runs import PREDICTED, growing_trees, study_lines, trees_of_solid
 from studies.scaling.work import Request, balanced_tree, busiest
 
 BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
