@@ -96,7 +96,7 @@ def test_processes_are_ended_in_the_midst_of_what_they_tell(problem, tmp_path):
     written = tmp_path / "written"
     processes._pool.submit(write_half_a_result, str(written))
     wait_for(written.exists, "half a result")
-    manager = processes._executor._executor_manager_thread
+    manager = processes._pool._executor._executor_manager_thread
     # By now it waits for the rest.
     time.sleep(0.2)
     processes.close()
