@@ -5,12 +5,14 @@ provenance, processes with their threads and ranks, and the finite element (`fem
 """
 
 import os as _os
+import sys as _sys
 from typing import TYPE_CHECKING
 
 from carillon import lazy_exports as _lazy_exports
 from carillon.processes import kernel_cache as _kernel_cache
 from carillon.processes import mpi_environment as _mpi_environment
 from carillon.processes import present_folder as _present_folder
+from carillon.processes import rooms as _rooms
 
 if TYPE_CHECKING:
     from carillon.api import (
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from carillon.errors import ConvergenceError, UserError
 
 # Before anything loads numpy, and with it OpenBLAS, or numba, or MPI.
+_rooms.find(_sys.path)
 # numpy, scipy and PETSc have a copy of OpenBLAS each. An idle thread of one copy spins for 2^26
 # cycles beside those of the others, which halves the speed of code that calls them in turn; with
 # this value, unless the user has set one, it goes to sleep at once.

@@ -463,7 +463,7 @@ def compare(solution: Solution, truth: Solution) -> SpectrumComparison:
     return compare_modes(solution._file(), truth._file())
 
 
-def audit(solution: Solution | str | Path, tolerance: float = 1e-6) -> Audit:
+def audit(solution: Solution | str | Path, tolerance: float = 1e-7) -> Audit:
     """Check a spectrum by itself: residuals, orthogonality, and a count by inertia.
 
     K and M are assembled anew; `faults` of what is returned says what is wrong, a sentence each.

@@ -21,7 +21,7 @@ from tests.rank_counts import SEVERAL
 from tests.small_project import PROJECT, write_clips
 from workflow.disk_space import MODULES, require_own
 
-CHECKOUT = Path(present_folder.__file__).resolve().parent.parent
+CHECKOUT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(sys.executable).with_name("carillon")
 """As it is installed; `python -m` takes modules from the present folder before anything can be said
 against it."""

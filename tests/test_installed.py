@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from carillon import ROOMS
 from tests.patience import HANG_SECONDS
 
 pytestmark = pytest.mark.nightly
@@ -69,12 +70,63 @@ def test_the_console_script_is_the_program(site, installed):
 
 def test_modules_and_data_come_from_the_installation(site, installed, tmp_path):
     where = installed("-c", "import carillon, forests.default as d; print(d.DEFAULT_FILE)").stdout
-    assert Path(where.strip()) == site / "forests" / "default.h5"
+    assert Path(where.strip()) == site / "carillon" / "_rooms" / "forests" / "default.h5"
     installed("-m", "carillon", "inspect-forests")
     # Ground truth needs the fewest kernels, which have to be compiled for the other folder.
     solid = ("builtin:bar", "--resolution", 6, "--method", "slepc", "--modes", 8)
     installed("-m", "carillon", "modes", *solid, "--out", "modes.h5")
     assert (tmp_path / "modes.h5").exists()
+
+
+def test_one_name_is_installed(site):
+    """Beside what pip writes of any package."""
+    names = {path.name for path in site.iterdir() if path.suffix != ".dist-info"}
+    assert names - {"bin", "__pycache__"} == {"carillon"}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_module_is_in_the_wheel(room, site):
+    installed = site / "carillon" / "_rooms"
+    of_room = installed.parent if room == "carillon" else installed / room
+    made = {path.relative_to(CHECKOUT / room) for path in (CHECKOUT / room).rglob("*.py")}
+    assert {path for path in made if not (of_room / path).is_file()} == set()
+
+
+@pytest.mark.parametrize("name", ["solver", "workflow", "sound"])
+def test_a_foreign_package_of_the_same_name_is_left_alone(name, site, tmp_path):
+    """It is found by those who do not import Carillon, and never by Carillon's own processes."""
+    foreign = tmp_path / "packages" / name
+    foreign.mkdir(parents=True)
+    (foreign / "__init__.py").write_text("MINE = True\n")
+    environment = {**os.environ, "PYTHONPATH": f"{site}{os.pathsep}{foreign.parent}"}
+
+    def run(*words: object) -> str:
+        words = [sys.executable, *map(str, words)]
+        options = {"cwd": tmp_path, "env": environment, "timeout": HANG_SECONDS}
+        done = subprocess.run(words, capture_output=True, text=True, **options)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert run("-c", f"import {name}; print({name}.MINE)") == "True\n"
+    own = run("-c", f"import carillon, {name}; print({name}.__file__)")
+    assert Path(own.strip()).is_relative_to(site / "carillon" / "_rooms")
+    assert "modes of a solid" in run("-m", "carillon", "--help")
+
+
+def test_rooms_start_processes_of_their_own(installed, tmp_path):
+    """A search in workers, which import the rooms anew."""
+    (tmp_path / "search.py").write_text(
+        "import carillon as ca, numpy as np\n"
+        "if __name__ == '__main__':\n"
+        "    t = np.arange(4000) / 8000\n"
+        "    clip = 0.3 * np.exp(-6 * t) * (np.sin(4400 * t) + np.sin(8200 * t))\n"
+        "    ca.write_wav('clip.wav', clip, 8000)\n"
+        "    target = dict(name='end', vertex=0, clip='clip.wav')\n"
+        "    settings = dict(evaluations=4, workers=2)\n"
+        "    print(len(ca.design(mesh='builtin:bar', resolution=16, coarsen='none',\n"
+        "                        targets=[target], optimiser=settings).frequencies))\n"
+    )
+    assert installed("search.py").stdout == "2\n"
 
 
 def test_rules_are_found_and_planned(site, installed):
@@ -97,6 +149,7 @@ def test_the_page_of_the_studio_is_whole(site):
         if path.suffix in (".js", ".css", ".svg", ".html")
         or path.name in ("LICENSE", "vendor.json")
     }
-    page = site / "studio" / "page"
-    found = {str(path.relative_to(site)) for path in page.rglob("*") if path.is_file()}
+    rooms = site / "carillon" / "_rooms"
+    page = rooms / "studio" / "page"
+    found = {str(path.relative_to(rooms)) for path in page.rglob("*") if path.is_file()}
     assert len(made) > 40 and made == found

@@ -15,7 +15,16 @@ from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT, planned
 from workflow import source_files, sources
 
-PACKAGES = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
+PACKAGES = (
+    "carillon",
+    "dataset_gen",
+    "forests",
+    "solver",
+    "sound",
+    "studio",
+    "workflow",
+    "studies",
+)
 CONFIG = """\
 results_dir: results
 models: {{bar: {{mesh: 'builtin:bar', resolution: 8}}}}

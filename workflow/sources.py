@@ -13,9 +13,15 @@ from functools import cache
 from pathlib import Path
 
 from carillon import ROOMS
+from carillon.processes import rooms
 from workflow import source_files
 
 ROOT = Path(__file__).resolve().parent.parent
+"""Folder of the rooms."""
+SURFACE = ["carillon", "api"]
+"""What users import, and nothing in the project; it names all rooms."""
+OF_CARILLON = Path(rooms.PARENT)
+"""Folder of `carillon`, another one if that is installed."""
 
 
 def fingerprint(*modules: str) -> str:
@@ -33,7 +39,8 @@ def fingerprint(*modules: str) -> str:
     """
     digest = hashlib.sha256()
     for path in sorted(_needed(modules)):
-        digest.update(str(path.relative_to(ROOT)).encode())
+        root = ROOT if path.is_relative_to(ROOT) else OF_CARILLON
+        digest.update(str(path.relative_to(root)).encode())
         digest.update(_content(path))
     return digest.hexdigest()[:16]
 
@@ -58,12 +65,13 @@ def _needed(modules: Iterable[str]) -> set[Path]:
 def _file_of(module: str) -> Path | None:
     """File of a module of the project; None if it is another package's, or no module."""
     parts = module.split(".")
-    if parts[0] not in ROOMS:
+    if parts[0] not in ROOMS or parts[:2] == SURFACE:
         return None
-    path = ROOT.joinpath(*parts)
-    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
-        if candidate.is_file():
-            return candidate
+    for root in (ROOT, OF_CARILLON):
+        path = root.joinpath(*parts)
+        for candidate in (path.with_suffix(".py"), path / "__init__.py"):
+            if candidate.is_file():
+                return candidate
     return None
 
 

@@ -12,12 +12,11 @@ import os
 import sys
 from collections.abc import Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
+from carillon.processes import rooms
 from carillon.processes.loading import while_loading
 
 _NUMBA = "numba.core.config"
-_ROOT = Path(__file__).resolve().parent.parent
 _ELSEWHERE = "/"
 _RC = "MATPLOTLIBRC"
 
@@ -39,7 +38,8 @@ def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -
     ----------
     path
         Where this process looks for modules. Where the first is the folder of Carillon itself, as
-        in its checkout, processes that are started from here look there, too.
+        in its checkout, processes that are started from here look there, too; those of an
+        installation look into the folder of its rooms.
 
     Examples
     --------
@@ -48,9 +48,12 @@ def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -
     >>> environment
     {'PYTHONSAFEPATH': '1'}
     """
-    if not environment.get("PYTHONSAFEPATH") and path and Path(path[0] or ".").resolve() == _ROOT:
+    if not environment.get("PYTHONSAFEPATH"):
+        first = os.path.realpath(path[0] or ".") if path else ""
+        found = [each for each in rooms.folders() if each == rooms.INSTALLED or each == first]
         others = environment.get("PYTHONPATH")
-        environment["PYTHONPATH"] = os.pathsep.join([str(_ROOT), *([others] if others else [])])
+        if found:
+            environment["PYTHONPATH"] = os.pathsep.join([*found, *([others] if others else [])])
     environment["PYTHONSAFEPATH"] = "1"
 
 

@@ -37,7 +37,7 @@ _PACKAGES = (
 @cache
 def commit() -> str:
     """Commit of the checkout the packages run from, `-dirty` if it has changes; else 'unknown'."""
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     try:
         described = subprocess.run(
             ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],

@@ -19,6 +19,7 @@ from pathlib import Path
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
+from carillon.processes import rooms
 from carillon.processes.threads import allowed_cores
 from carillon.records.provenance import compiled_for
 
@@ -27,7 +28,6 @@ EXAMPLES = """examples:
   compile training spectra blocks
 """
 
-CHECKOUT = Path(__file__).resolve().parents[2]
 PACKAGES = ("carillon", "dataset_gen", "forests", "solver")
 DONE = Path(__file__).parent / "__pycache__"
 """Where is kept what was compiled."""
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _compile(group: str) -> None:
-    path = [str(CHECKOUT), os.environ.get("PYTHONPATH")]
+    path = [*rooms.folders(), os.environ.get("PYTHONPATH")]
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(filter(None, path)),
@@ -106,6 +106,11 @@ def compiled(group: str, wanted: str) -> bool:
 
 def sources() -> str:
     """The processor, and every source with its time and size, as compiled kernels are kept by."""
-    files = sorted(path for each in PACKAGES for path in (CHECKOUT / each).rglob("*.py"))
+    files = sorted(
+        path
+        for folder in map(Path, rooms.folders())
+        for each in PACKAGES
+        for path in (folder / each).rglob("*.py")
+    )
     stamps = [[str(path), path.stat().st_mtime_ns, path.stat().st_size] for path in files]
     return json.dumps([compiled_for(), os.environ.get("NUMBA_CACHE_DIR"), stamps])
