@@ -10,11 +10,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from annotated_types import Ge, GroupedMetadata, Gt, Le, Lt, MaxLen, MinLen
-
 from carillon.parameters.model import REQUIRED, Check, OneOf
 
-_LIMITS = {Ge: "ge", Gt: "gt", Le: "le", Lt: "lt", MinLen: "min_length", MaxLen: "max_length"}
+_LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 
 
 @dataclass(frozen=True)
@@ -166,14 +164,13 @@ def _united(members: list[Any], nullable: bool) -> ValueDomain:
 def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
     limits = dict(domain.limits)
     for mark in marks:
-        for each in mark if isinstance(mark, GroupedMetadata) else [mark]:
-            if isinstance(each, str):
-                domain = replace(domain, meaning=each)
-            elif isinstance(each, Check) and each.before:
-                domain = replace(domain, kind=str, items=())
-            elif isinstance(each, OneOf):
-                domain = replace(domain, choices=each.names)
-            elif type(each) in _LIMITS:
-                name = _LIMITS[type(each)]
-                limits[name] = getattr(each, name)
+        if isinstance(mark, str):
+            domain = replace(domain, meaning=mark)
+        elif isinstance(mark, Check) and mark.before:
+            domain = replace(domain, kind=str, items=())
+        elif isinstance(mark, OneOf):
+            domain = replace(domain, choices=mark.names)
+        else:
+            known = {name: getattr(mark, name, None) for name in _LIMITS}
+            limits |= {name: value for name, value in known.items() if value is not None}
     return replace(domain, limits=limits)

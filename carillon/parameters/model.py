@@ -35,6 +35,21 @@ class OneOf:
         return core_schema.literal_schema(list(self.names))
 
 
+class Within:
+    """Marker of limits: ge, gt, le and lt of numbers, min_length and max_length of texts and lists.
+
+    Those of `annotated_types` mean the same; to import these takes as long as `--help`.
+    """
+
+    def __init__(self, **limits: float) -> None:
+        for name, value in limits.items():
+            setattr(self, name, value)
+
+    def __get_pydantic_core_schema__(self, source: Any, admit: GetCoreSchemaHandler) -> CoreSchema:
+        schema: Any = {**admit(source), **vars(self)}
+        return schema  # type: ignore[no-any-return]
+
+
 @dataclass(frozen=True)
 class Check:
     """Marker in `Annotated[..., Check(function)]` of values that a function checks or converts.

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, TypeVar
 
-from annotated_types import Ge, Gt, Interval, Le, Len, Lt
-
 from carillon.limits import DENSITIES, MODULI, POISSON, RESOLUTIONS, UNITS
-from carillon.parameters.model import OneOf
+from carillon.parameters.model import OneOf, Within
 from carillon.processes.threads import allowed_cores
 
 T = TypeVar("T")
@@ -23,26 +21,26 @@ WORKERS_OF_CORE = 4
 """Processes or threads that one command may start for each core of a machine with more."""
 
 
-def between(low: float, high: float) -> Interval:
+def between(low: float, high: float) -> Within:
     """Mark of numbers within limits, both of them included."""
-    return Interval(ge=low, le=high)
+    return Within(ge=low, le=high)
 
 
 Pair = tuple[T, T]
 Triple = tuple[T, T, T]
-File = Annotated[str, Len(1, 4000)]
+File = Annotated[str, Within(min_length=1, max_length=4000)]
 """Path of a file."""
 Coordinate = Annotated[float, between(-1e18, 1e18)]
 Point = Annotated[Triple[Coordinate], "a position [m]"]
-Count = Annotated[int, Ge(1), Le(LARGEST)]
+Count = Annotated[int, between(1, LARGEST)]
 """A number of things, one at least."""
-Number = Annotated[int, Ge(0), Le(LARGEST)]
+Number = Annotated[int, between(0, LARGEST)]
 """A number of things or of one of them, counted from 0."""
 Workers = Annotated[int, between(1, max(MOST_WORKERS, WORKERS_OF_CORE * allowed_cores()))]
 """A number of processes or threads, no more than this machine could bear."""
-Positive = Annotated[float, Gt(0.0)]
-NonNegative = Annotated[float, Ge(0.0)]
-Seed = Annotated[int, Ge(0), Le(LARGEST), "seed of random numbers"]
+Positive = Annotated[float, Within(gt=0.0)]
+NonNegative = Annotated[float, Within(ge=0.0)]
+Seed = Annotated[int, between(0, LARGEST), "seed of random numbers"]
 
 Mesh = Annotated[str, "either builtin:NAME or a mesh file"]
 Resolution = Annotated[
@@ -62,7 +60,9 @@ Components = Annotated[
     "either error, which rejects voxels in several pieces, or largest, which keeps one",
 ]
 Density = Annotated[float, between(*DENSITIES), "mass density [kg/m^3]"]
-PoissonRatio = Annotated[float, Gt(POISSON[0]), Lt(POISSON[1]), "Poisson's ratio [1]"]
+PoissonRatio = Annotated[float, Within(gt=POISSON[0], lt=POISSON[1]), "Poisson's ratio [1]"]
 YoungsModulus = Annotated[float, between(*MODULI), "Young's modulus [Pa]"]
 Tolerance = Annotated[float, between(1e-15, 1.0), "relative error that double precision can reach"]
-NumberOfModes = Annotated[int, Ge(1), Le(MOST_UNKNOWNS), "number of modes, rigid ones included [1]"]
+NumberOfModes = Annotated[
+    int, between(1, MOST_UNKNOWNS), "number of modes, rigid ones included [1]"
+]

@@ -7,12 +7,10 @@ from dataclasses import KW_ONLY, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from annotated_types import Len
-
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.model import DEFAULT_DENSITY
-from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters import REQUIRED, OneOf, Within, option, parameters
 from carillon.parameters.documents import document_of, parameters_from, read_parameters
 from carillon.parameters.quantities import (
     Components,
@@ -87,7 +85,7 @@ class Project:
         "auto takes those of the clips that stand apart and are heard, the 30 strongest at most "
         "[1]",
     )
-    targets: Annotated[tuple[TargetEntry, ...], Len(1, 100)] = option(
+    targets: Annotated[tuple[TargetEntry, ...], Within(min_length=1, max_length=100)] = option(
         REQUIRED, "struck points and the clips that they shall sound like"
     )
     material: MaterialSettings = option(

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from annotated_types import Interval, Len, MaxLen
-
-from carillon.parameters import REQUIRED, Check, OneOf, option, parameters
+from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.quantities import File, Pair, Point, YoungsModulus, between
 
 LEAST_WEIGHT = 1e-12
@@ -27,12 +25,13 @@ def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
     return bounds
 
 
-ShownName = Annotated[str, Len(1, 100), Check(_printable)]
+ShownName = Annotated[str, Within(min_length=1, max_length=100), Check(_printable)]
 """A name that messages and pages show."""
 ModeCount = Annotated[int, between(1, 10_000)]
 Dampings = Annotated[str, OneOf("clips", "material")]
 """Where dampings of a design come from."""
 OptimiserMethod = Annotated[str, OneOf("hybrid", "cma", "bfgs")]
+Frequency = Annotated[float, Within(gt=0.0, le=1e6)]
 Weight = Annotated[float, between(0.0, 1e9)]
 
 
@@ -56,12 +55,12 @@ class TargetEntry:
     allow_clipped: bool = option(
         False, "whether the clip may be clipped; its samples at full scale are left out then"
     )
-    without: Annotated[tuple[Annotated[float, Interval(gt=0.0, le=1e6)], ...], MaxLen(1000)] = (
-        option(
-            (),
-            "frequencies of modes of the clip that are left out, such as those of a room or a hand "
-            "[Hz]",
-        )
+    without: Annotated[
+        tuple[Annotated[float, Within(gt=0.0, le=1e6)], ...], Within(max_length=1000)
+    ] = option(
+        (),
+        "frequencies of modes of the clip that are left out, such as those of a room or a hand "
+        "[Hz]",
     )
 
     def __post_init__(self) -> None:
@@ -134,7 +133,7 @@ class OptimiserSettings:
     method: OptimiserMethod = option(
         "hybrid", "either hybrid, or one of its two parts alone, cma or bfgs"
     )
-    seconds: Annotated[float, Interval(gt=0.0, le=1e8)] | None = option(
+    seconds: Annotated[float, Within(gt=0.0, le=1e8)] | None = option(
         60.0, "wall time of the search; no limit if null [s]"
     )
     evaluations: Annotated[int, between(1, 10**9)] | None = option(

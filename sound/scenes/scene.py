@@ -9,11 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from annotated_types import Len
-
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.parameters import REQUIRED, Check, OneOf, option, parameters
+from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.documents import parameters_from, read_parameters
 from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import (
@@ -199,7 +197,7 @@ class ListenerEntry:
     path: (
         Annotated[
             tuple[tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate], ...],
-            Len(1, 10_000),
+            Within(min_length=1, max_length=10_000),
             Check(_in_time),
         ]
         | None
@@ -271,7 +269,9 @@ class Scene:
     """
 
     _: KW_ONLY
-    title: Annotated[str, Len(1, 200)] = option("Scene", "what pages call the scene")
+    title: Annotated[str, Within(min_length=1, max_length=200)] = option(
+        "Scene", "what pages call the scene"
+    )
     seconds: Annotated[float, between(0.01, 600.0)] = option(5.0, "how long it lasts [s]")
     gravity: Vector = option(
         (0.0, 0.0, -9.81),
@@ -279,7 +279,7 @@ class Scene:
     )
     ground: _Coordinate | None = option(0.0, "height of a floor without end [m]; null for none")
     ground_material: Material = option("concrete", "what the floor is made of, a material by name")
-    objects: Annotated[tuple[ObjectEntry, ...], Len(1, 1000)] = option(
+    objects: Annotated[tuple[ObjectEntry, ...], Within(min_length=1, max_length=1000)] = option(
         REQUIRED, "solids of the scene"
     )
     listener: ListenerEntry = option(ListenerEntry, "who hears it")
