@@ -6,10 +6,13 @@ import csv
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 from studies.base.numbers import show
-from studies.base.page import unbroken
-from studies.base.table import kind_in, read_table
+from studies.base.parts import unbroken
+from studies.base.study import Study
+from studies.base.style import save
+from studies.base.table import kind_in, read_table, write_table
 
 
 class Page(HTMLParser):
@@ -52,6 +55,21 @@ class Page(HTMLParser):
         if self._in_cell:
             text, value = self.tables[self._table][-1][-1]
             self.tables[self._table][-1][-1] = (text + data, value)
+
+
+def page_of(study: Study, results: Any, path: Path) -> Page:
+    """The page that a study makes of results, with its tables beside it and its figures."""
+    tables = study.made(results)
+    (path.parent / "tables").mkdir(parents=True, exist_ok=True)
+    for table in tables.values():
+        write_table(table, path.parent / "tables")
+    for figure in study.figures:
+        if not figure.of:
+            drawn = results.figure(f"{figure.file}.svg")
+            drawn.parent.mkdir(exist_ok=True)
+            save(study.named(figure.draw)(results), [drawn])
+    path.write_text(study.build(results, tables), encoding="utf-8")
+    return Page(path)
 
 
 def assert_self_contained(page: Page) -> None:

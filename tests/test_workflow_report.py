@@ -152,7 +152,7 @@ def headlines(methods: dict, summary: list[dict]) -> dict[str, Table]:
     results = SimpleNamespace(methods=methods, titles=titles)
     forests = {"method": "calibrated, forests", "training_seconds": 8.0}
     return {
-        "design": Table("design", "", [], list(design(results))),
+        "design": Table("design", "", [], list(design.rows(results))),
         "summary": Table("summary", "", [], summary),
         "blocks": Table("blocks", "", [], [forests]),
     }

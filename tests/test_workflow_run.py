@@ -118,7 +118,7 @@ def test_page_shows_every_model_with_its_pictures(page, results):
     assert page.source.count("data:image/png;base64,") == drawn
 
 
-@pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in NOT_SHOWN])
+@pytest.mark.parametrize("name", [name for name in REPORT.tables if name not in NOT_SHOWN])
 def test_page_and_files_hold_the_same_numbers(page, results, name):
     assert_same_numbers(page, results / "tables", name)
 
@@ -167,7 +167,7 @@ def test_every_result_tells_its_origin(results):
         assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
 
 
-@pytest.mark.parametrize("name", [name for name in REPORT.entries if name not in APART])
+@pytest.mark.parametrize("name", [name for name in REPORT.tables if name not in APART])
 def test_every_benchmark_table_tells_its_conditions(page, results, name):
     table = read_table(results / "tables" / f"{name}.json")
     texts = table.conditions.texts

@@ -135,7 +135,7 @@ def test_every_rule_that_runs_a_package_says_which_modules():
             runs = "    shell:" in rule or "    script:" in rule
             changed = rule.startswith("use") and "    params:" in rule
             if runs or changed:
-                assert re.search(r"source=(source|made_by|made_with_tables)\(", rule), rule
+                assert re.search(r"source=source\(|\*\*(made_by|made_with_tables)\(", rule), rule
 
 
 @pytest.fixture(scope="module")

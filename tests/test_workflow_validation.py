@@ -31,7 +31,6 @@ from workflow.__main__ import main
 from workflow.validation.criteria import Criterion
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import COARSENED, Evidence
-from workflow.validation.page import page as rendered
 from workflow.validation.study import VALIDATION
 from workflow.variants import SHOWN
 
@@ -156,9 +155,8 @@ def test_a_mode_that_is_missing_fails_in_words(run, tmp_path):
     write_response(folder / "response.h5", respond(paths["truth"], candidates, StrikeOptions()), {})
     evidence = Evidence(tmp_path / "spoiled", "block")
     evidence.tolerances["solid_rms"] = 1e-9
-    tables = {name: make(evidence) for name, make in VALIDATION.entries.items()}
-    html = rendered(evidence, tables)
-    (tmp_path / "page.html").write_text(html)
+    tables = VALIDATION.made(evidence)
+    (tmp_path / "page.html").write_text(VALIDATION.build(evidence, tables))
     text = words_of(Page(tmp_path / "page.html"))
     missed = {row["key"] for row in tables["criteria"].rows if row["verdict"] == "missed"}
     assert {"eigenvalue_error", "subspace_angle", "response", "counted", "solid_rms"} <= missed

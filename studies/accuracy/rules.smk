@@ -1,12 +1,7 @@
-# Discretisations against frequencies that no mesh made: `snakemake accuracy`, no part of the
-# default run.
-from studies.accuracy import study as accuracy_study
+# Discretisations against frequencies that no mesh made: `snakemake accuracy`.
 from importlib.util import find_spec
 
-
-rule accuracy:
-    input:
-        f"{place(accuracy_study.ACCURACY)}/report.html",
+from studies.accuracy import study as accuracy_study
 
 
 # It takes all cores, although it uses one, since it times what it does.
@@ -25,4 +20,4 @@ rule measure_accuracy:
         how=accuracy_study.arguments(config),
         others=[name for name in ("gmsh", "skfem") if find_spec(name)],
     shell:
-        "python -m solver accuracy {params.how:q} --out {output:q} > {log:q} 2>&1"
+        "python -m carillon study accuracy {params.how:q} --out {output:q} > {log:q} 2>&1"

@@ -7,11 +7,9 @@ from workflow.arguments import options
 
 ACCURACY = Study(
     name="accuracy",
-    package="studies.accuracy",
-    folder="accuracy",
     title="Discretisations against references that no mesh made",
     results="results:AccuracyStudy",
-    page="page:page",
+    tables=("summary", "levels", "references", "provenance"),
     measured=lambda config: ["accuracy.json"],
     figures=(
         Figure("unknowns", "plots:unknowns_figure", "accuracy.json"),
@@ -23,9 +21,4 @@ ACCURACY = Study(
 def arguments(config: Config) -> list[str]:
     """What is measured, and how often."""
     part = config["accuracy"]
-    how = {
-        "solids": ",".join(part["solids"]),
-        "levels": part["levels"],
-        "runs": part["runs"],
-    }
-    return options(how)
+    return options({**part, "solids": ",".join(part["solids"])})

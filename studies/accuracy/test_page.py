@@ -9,15 +9,12 @@ import yaml
 
 from studies.accuracy.config import AccuracySection
 from studies.accuracy.measure import AccuracyOptions, summarised
-from studies.accuracy.page import FIGURES, page
+from studies.accuracy.page import FIGURES
 from studies.accuracy.results import AccuracyStudy
 from studies.accuracy.solids import SOLIDS
 from studies.accuracy.study import ACCURACY
 from studies.accuracy.tables import LABELS
-from studies.base.study import named
-from studies.base.style import save
-from studies.base.table import write_table
-from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.pages import assert_same_numbers, assert_self_contained, page_of
 
 KINDS = list(LABELS)
 
@@ -66,26 +63,13 @@ def study(request, tmp_path) -> AccuracyStudy:
 
 
 def test_the_page_holds_tables_and_figures(study):
-    tables = {name: make(study) for name, make in ACCURACY.entries.items()}
-    for figure in ACCURACY.figures:
-        drawn = named("studies.accuracy", figure.draw)(study)
-        save(drawn, [_made(study.figure(f"{figure.file}.svg"))])
-    for table in tables.values():
-        write_table(table, _made(study.folder / "tables" / table.name).parent)
-    path = study.folder / "report.html"
-    path.write_text(page(study, tables), encoding="utf-8")
-    shown = Page(path)
+    shown = page_of(ACCURACY, study, study.folder / "report.html")
     assert_self_contained(shown)
     assert {f"plot-{name}" for name in FIGURES} <= set(shown.ids)
-    for name in tables:
+    for name in ACCURACY.tables:
         assert_same_numbers(shown, study.folder / "tables", name)
     assert "the solid is in 5 pieces" in shown.source
     assert ("Gmsh 4.15" in shown.source) == (study.without == "")
-
-
-def _made(path):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path
 
 
 def test_the_configuration_names_what_the_command_does():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from studies.base.conditions import Record
 from studies.base.results import Results
+from studies.base.study import Study, no_files
+from studies.base.table import Row
 from workflow import solids
 
 
@@ -24,6 +26,33 @@ class Case:
     def path(self) -> str:
         """Name of the result file below the folder of the cases."""
         return f"{self.solid}/{self.resolution}-{self.material}.json"
+
+
+@dataclass(frozen=True)
+class CaseStudy(Study):
+    """A study whose cases are measured by the command of its name, each into its own files.
+
+    Attributes
+    ----------
+    arguments
+        How every case is measured, of a configuration.
+    outputs
+        Files of a case: the command's options, and endings.
+    timed
+        Whether a case takes all cores, since its wall time counts.
+    """
+
+    arguments: Callable[[Mapping[str, Any]], list[str]] = no_files
+    outputs: tuple[tuple[str, str], ...] = (("out", ".json"),)
+    timed: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        main, *others = (partial(case_files, section=self.name, ending=e) for _, e in self.outputs)
+        object.__setattr__(self, "measured", main)
+        object.__setattr__(
+            self, "beside", lambda config: [f for each in others for f in each(config)]
+        )
 
 
 def cases_of(config: Mapping[str, Any], section: str) -> list[Case]:
@@ -58,6 +87,11 @@ class CaseResults(Results):
         return {f"cases/{case.path}": each["provenance"] for case, each in self.ratings.items()}
 
     @property
+    def records(self) -> dict[str, Record]:
+        """The same by what tables call the cases."""
+        return {self.label(case): each["provenance"] for case, each in self.ratings.items()}
+
+    @property
     def solids(self) -> list[str]:
         """Names of the solids studied."""
         return solids.named(self.config, f"{self.section}.models")
@@ -74,3 +108,12 @@ class CaseResults(Results):
     def label(self, case: Case) -> str:
         """A case in a few words."""
         return f"{self.titles[case.solid]} {case.resolution}, {case.material}"
+
+
+def truths_of(study: CaseResults) -> Iterator[Row]:
+    """Size and proof of the ground truth of every case."""
+    for case, rating in study.ratings.items():
+        truth = rating["truth"]
+        counted = "inertia_count" in truth
+        proof = f"{truth['inertia_expected']} / {truth['inertia_count']}" if counted else None
+        yield {**rating, **truth, **study.identity(case), "inertia": proof}

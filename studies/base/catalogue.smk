@@ -1,7 +1,5 @@
 # Where the studies lie, and what their tables and pages are made from.
 from studies.base import catalogue
-from studies.base.cases import cases_of
-from studies.base.entry import descriptions
 from workflow import solids
 
 ALL_STUDIES = catalogue.all_studies()
@@ -24,13 +22,15 @@ def place(study):
 
 
 def logs_of(study):
-    """Folder of a study's logs."""
-    return str(Path(LOGS, study.folder))
+    """Folder of a study's logs; those of the report are not apart."""
+    return str(Path(LOGS, study.folder or study.name.removesuffix("report")))
 
 
-def tables_in(study):
-    """JSON files of a study's tables."""
-    return [f"{place(study)}/tables/{name}.json" for name in study.entries]
+def tables_in(study, *names, kinds=("json",)):
+    """Files of tables of a study, of all unless some are named, beside its page."""
+    folder = Path(place(study), study.file).parent / "tables"
+    names = [study.prefix + name for name in names or study.tables]
+    return [f"{folder}/{name}.{kind}" for name in names for kind in kinds]
 
 
 def figures_of(study):
@@ -41,32 +41,26 @@ def figures_of(study):
 
 def below(study, names):
     """Files of a study by their names below its folder."""
-    return [str(Path(place(study), name)) for name in names]
+    return [os.path.normpath(Path(place(study), name)) for name in names]
 
 
 def made_by(script, study, *references):
-    """Fingerprint of what a script does for a study with what is named `MODULE:NAME`."""
-    modules = [study.module(each) for each in references]
-    return source(f"studies.base.scripts.{script}", *modules)
+    """Parameters of a rule of a study: the fingerprint of what its script does, and the study.
+
+    The script does it with what is named `MODULE:NAME`.
+    """
+    modules = [study.module(each) for each in (study.results, *references)]
+    return {"source": source(f"studies.base.scripts.{script}", *modules), "study": study.name}
 
 
 def made_with_tables(study):
-    """Fingerprint of a page whose rule makes its tables as well."""
-    modules = [study.module(each) for each in (study.results, study.page)]
-    return source("studies.base.scripts.page", *modules, *study.table_modules)
+    """The same of a page whose rule makes its tables as well."""
+    return made_by("page", study, study.page, study.tabulated)
 
 
-def described(study, *names):
-    """What a script has to know of a study."""
-    return {name: getattr(study, name) for name in ("package", "folder", "results", *names)}
-
-
-def templates(study, *names):
-    """Templates of a study's page: its own, and what all pages share."""
-    base = Path(catalogue.__file__).parent
-    own = base.parent.parent.joinpath(*study.package.split("."))
-    shared = ("base.html.j2", "macros.html.j2", "page.css")
-    return [*(own / name for name in names or ["page.html.j2"]), *(base / name for name in shared)]
+def meshes_of(section):
+    """Mesh files of the solid of a case of a study."""
+    return lambda wildcards: solids.mesh_files(config, section, wildcards.solid)
 
 
 def case_arguments(section):

@@ -20,7 +20,7 @@ from carillon.fem.geometry import HexMesh
 from carillon.files.atomic import atomic_path
 from solver.response.response import FLOOR_DECIBELS, SAMPLE_RATE_HERTZ, decibels, spectrogram
 from studies.base.colours import MUTED, themed
-from studies.base.page import data_uri
+from studies.base.parts import data_uri
 from studies.base.style import PNG_DPI, svg
 
 Array = NDArray[np.float64]

@@ -1,63 +1,91 @@
-"""HTML pages that carry their figures, tables and style within themselves."""
+"""HTML pages that carry their figures, tables and style within themselves, as values of Python.
+
+A study's function `page(results, tables)` returns a `StudyPage`, whose sections consist of the
+parts in `studies.base.parts`. All pages have the one template beside this file.
+"""
 
 from __future__ import annotations
 
-import base64
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
-from studies.base.colours import themed
-from studies.base.conditions import LABELS
-from studies.base.numbers import show
+from studies.base.parts import html, machine, together
+from studies.base.table import Table
 
 HERE = Path(__file__).parent
-ROOT = HERE.parent.parent
+TEMPLATE, STYLE = "page.html.j2", "page.css"
+FOOTER = html(
+    """This page holds all of its figures and numbers; tables and figures are also files in
+    <span class="file">tables/</span> and <span class="file">figures/</span> beside it. Frequencies
+    are in Hz, eigenvalues in rad²/s², times in wall seconds."""
+)
 
 FIRST_MODES = 12
 """Elastic modes listed from the first on; beyond them `HIGHER_MODES`."""
 HIGHER_MODES = (24, 32, 48, 64, 96, 128, 192, 256)
 
 
-def rendered(template: str, **values: Any) -> str:
-    """A page by its template, as seen from the folder that holds all packages."""
+class Section(NamedTuple):
+    """A section of a page: its anchor, its heading, that in the menu if shorter, its content."""
+
+    id: str
+    title: str
+    content: Markup
+    menu: str = ""
+
+
+def section(id: str, title: str, *parts: Any, menu: str = "") -> Section:
+    """A section of parts, of which those that are empty do not count."""
+    return Section(id, title, together(*parts), menu)
+
+
+def origins(table: Table, config: str = "config.yaml in the folder above this page") -> Section:
+    """The last section: machines, commands, and where the configuration lies."""
+    return section("provenance", "Provenance", machine(table, config))
+
+
+@dataclass(frozen=True)
+class StudyPage:
+    """A page.
+
+    Attributes
+    ----------
+    title, kicker, lede
+        Heading, the words above it, the paragraph below it.
+    sections
+        In their order; those that are None are left out.
+    footer
+        Last paragraph.
+    """
+
+    title: str
+    kicker: str
+    lede: str
+    sections: Iterable[Section | None]
+    footer: str = FOOTER
+
+    def __str__(self) -> str:
+        """The page as HTML."""
+        style = Markup((HERE / STYLE).read_text())
+        sections = [section for section in self.sections if section]
+        return _template().render(page=self, sections=sections, style=style)
+
+
+@cache
+def _template() -> Template:
     environment = Environment(
-        loader=FileSystemLoader(ROOT),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["show"] = unbroken
-    environment.globals["condition_labels"] = LABELS
-    environment.globals["style"] = Markup((HERE / "page.css").read_text())
-    return environment.get_template(template).render(**values)
-
-
-def inline(path: Path) -> Markup:
-    """An SVG file as part of a page, in the page's own colours and font."""
-    return Markup(themed(path.read_text(encoding="utf-8")))
-
-
-def unbroken(value: Any, kind: str = "text") -> str:
-    """The number as `show` writes it, with a space before its unit at which no line breaks."""
-    text = show(value, kind)
-    return text if kind == "text" else text.replace(" ", "\N{NO-BREAK SPACE}")
+    return environment.from_string((HERE / TEMPLATE).read_text())
 
 
 def listed_modes(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Of rows with a `mode` from the first elastic one on, those that a page lists."""
     higher = [row for row in rows[FIRST_MODES:] if row["mode"] in HIGHER_MODES]
     return rows[:FIRST_MODES] + higher
-
-
-def picture_uri(path: Path) -> str:
-    """A PNG file as a data URI."""
-    return data_uri("image/png", path.read_bytes())
-
-
-def data_uri(kind: str, content: bytes) -> str:
-    """Content of a file as a data URI."""
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

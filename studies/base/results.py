@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import yaml
+from markupsafe import Markup
 
 from studies.base.conditions import Record
+from studies.base.parts import inline
 from studies.base.table import Table, read_table
 from workflow import pinned_meshes, solids
 
@@ -99,6 +101,10 @@ class Results:
     def figure(self, name: str) -> Path:
         """A figure, by file name."""
         return self.folder / "figures" / name
+
+    def drawn(self, name: str) -> Markup:
+        """A figure as part of a page, by file name without ending."""
+        return inline(self.figure(f"{name}.svg"))
 
 
 def spelt(name: str) -> str:

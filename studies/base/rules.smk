@@ -1,4 +1,46 @@
-# Every study that is made in steps: results -> tables -> figures -> page.
+# Every study: the target of its name, none of which is part of the default run, and what is the
+# same for all that are made in steps: results -> tables -> figures -> page.
+
+
+for study in catalogue.all_studies().values():
+    if study.target and "{" not in study.file:
+
+        rule:
+            name:
+                study.name
+            input:
+                f"{place(study)}/{study.file}",
+
+
+for study in catalogue.of_cases():
+
+    rule:
+        name:
+            f"rate_{study.name}"
+        input:
+            mesh=meshes_of(study.name),
+            forest=settings.forest_files(config[study.name]["forest"]),
+        output:
+            **{
+                option: f"{place(study)}/cases/{{solid}}/{{resolution}}-{{material}}{ending}"
+                for option, ending in study.outputs
+            },
+        log:
+            f"{logs_of(study)}/{{solid}}/{{resolution}}-{{material}}.log",
+        benchmark:
+            f"{BENCHMARKS}/{study.name}/{{solid}}/{{resolution}}-{{material}}.tsv"
+        threads: SOLVER_CORES if study.timed else 1
+        resources:
+            **limits(f"rate_{study.name}"),
+        params:
+            source=source(f"studies.{study.name}.command"),
+            study=study.name,
+            case=case_arguments(study.name),
+            how=study.arguments(config),
+            outputs=lambda wildcards, output: options(dict(output.items())),
+        shell:
+            "python -m carillon study {params.study} {params.case:q} {params.how:q}"
+            " {params.outputs:q} > {log:q} 2>&1"
 
 
 for study in catalogue.in_steps():
@@ -9,21 +51,13 @@ for study in catalogue.in_steps():
         input:
             config=f"{RESULTS}/config.yaml",
             found=below(study, study.measured(config)),
-            described=descriptions(study.package, study.tables),
         output:
-            expand(
-                f"{place(study)}/tables/{{name}}.{{kind}}",
-                name=study.entries,
-                kind=("csv", "md", "json"),
-            ),
+            tables_in(study, kinds=("csv", "md", "json")),
         log:
             f"{logs_of(study)}/tables.log",
         localrule: True
         params:
-            source=source(
-                "studies.base.scripts.tabulate", study.module(study.results), *study.table_modules
-            ),
-            study=described(study, "tables"),
+            **made_by("tabulate", study, study.tabulated),
         script:
             "scripts/tabulate.py"
 
@@ -47,8 +81,7 @@ for study in catalogue.in_steps():
                 f"{logs_of(study)}/figures/{figure.file}.log",
             localrule: True
             params:
-                source=made_by("plot", study, study.results, figure.draw),
-                study=described(study),
+                **made_by("plot", study, figure.draw),
                 draw=figure.draw,
             script:
                 "scripts/plot.py"
@@ -61,14 +94,12 @@ for study in catalogue.in_steps():
             tables=tables_in(study),
             figures=figures_of(study),
             others=below(study, study.beside(config)),
-            templates=templates(study),
         output:
-            f"{place(study)}/report.html",
+            f"{place(study)}/{study.file}",
         log:
             f"{logs_of(study)}/report.log",
         localrule: True
         params:
-            source=made_by("page", study, study.results, study.page),
-            study=described(study, "page"),
+            **made_by("page", study, study.page),
         script:
             "scripts/page.py"

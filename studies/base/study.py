@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from carillon.command_line import exit_status
-from studies.base.entry import Entry, tables_of
+from studies.base.provenance import provenance
+from studies.base.table import Table, Tabulation
 from workflow import solids
 
 Config = Mapping[str, Any]
@@ -34,7 +35,7 @@ class Figure:
     file
         Name below the folder of the figures without ending; it may hold one wildcard.
     draw
-        Function `MODULE:NAME` of the results and the wildcard's value, see `named`.
+        Function `MODULE:NAME` of the results and the wildcard's value, see `Study.named`.
     needs
         File below the folder of the study that it is drawn from.
     of
@@ -49,7 +50,8 @@ class Figure:
     @property
     def name(self) -> str:
         """The file's name without its wildcard."""
-        return self.file.partition("}")[2].strip("-") or self.file.strip("{}")
+        name = self.file.partition("}")[2].strip("-") or self.file.strip("{}")
+        return name.replace("-", "_")
 
     def files(self, config: Config) -> list[str]:
         """Names of all files without ending; solids whose mesh does not exist have none."""
@@ -67,18 +69,25 @@ class Study:
     ----------
     name
         Of the study and, but for the report of a run, of the target that makes it.
-    package
-        Package that its modules, tables and template are in.
-    folder
-        Below that of the run.
     title
         What the page is about, for lists of pages.
     results
-        Class `MODULE:NAME` of the results, which takes their folder, see `named`.
+        Class `MODULE:NAME` of the results, which takes their folder, see `Study.named`.
     tables
-        File of the package that describes its tables, see `Entry`.
-    page
-        Function `MODULE:NAME` of results and tables that renders the page.
+        Names of its tables in their order; the module `tabulated` has them, with `_` for `-`, but
+        for `provenance`, which all studies share.
+    package
+        That its modules are in, the one of its name below `studies` unless said.
+    folder
+        Below that of the run, of its own name unless said.
+    page, tabulated
+        Function `MODULE:NAME` of results and tables that returns the page; module of the tables.
+    file
+        The page below the folder; it may hold one wildcard.
+    prefix
+        What the files of its tables begin with, that of its results.
+    target
+        Whether a target of its name makes the page, and nothing else.
     figures
         All figures.
     measured
@@ -88,40 +97,53 @@ class Study:
     """
 
     name: str
-    package: str
-    folder: str
     title: str
     results: str
-    page: str
-    tables: str = "tables.yaml"
+    tables: tuple[str, ...]
+    package: str = ""
+    folder: str | None = None
+    page: str = "page:page"
+    tabulated: str = "tables"
+    file: str = "report.html"
+    prefix: str = ""
+    target: bool = True
     figures: tuple[Figure, ...] = ()
     measured: Files = no_files
     beside: Files = no_files
 
-    @property
-    def table_modules(self) -> list[str]:
-        """Modules that the tables are made by."""
-        return sorted({entry.module for entry in self.entries.values()})
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "package", self.package or f"studies.{self.name}")
+        object.__setattr__(self, "folder", self.name if self.folder is None else self.folder)
 
     @cached_property
-    def entries(self) -> dict[str, Entry]:
+    def entries(self) -> dict[str, Tabulation]:
         """All tables by name."""
-        return tables_of(self.package, self.tables)
+        module = import_module(self.module(self.tabulated))
+        own = (name for name in self.tables if name != provenance.name)
+        tables = {name: getattr(module, name.replace("-", "_")) for name in own}
+        return {name: tables.get(name, provenance) for name in self.tables}
+
+    def open(self, run: Path, *wildcards: str) -> Any:
+        """The results below the folder of a run."""
+        return self.named(self.results)(run / str(self.folder), *wildcards)
+
+    def build(self, results: Any, tables: Mapping[str, Table] | None = None) -> str:
+        """The page as HTML; tables are made of the results if there are none."""
+        return str(self.named(self.page)(results, self.made(results) if tables is None else tables))
+
+    def made(self, results: Any) -> dict[str, Table]:
+        """All tables of results by name, but for those that are `absent` from these."""
+        absent = getattr(results, "absent", ())
+        return {name: make(results) for name, make in self.entries.items() if name not in absent}
+
+    def named(self, reference: str) -> Any:
+        """What `MODULE:NAME` stands for."""
+        return getattr(import_module(self.module(reference)), reference.partition(":")[2])
 
     def module(self, reference: str) -> str:
-        """Module of what is named `MODULE:NAME`."""
-        return module_of(self.package, reference)
-
-
-def module_of(package: str, reference: str) -> str:
-    """Module of `MODULE:NAME`, of the package itself if the module's name has no dot."""
-    module = reference.partition(":")[0]
-    return module if "." in module else f"{package}.{module}"
-
-
-def named(package: str, reference: str) -> Any:
-    """What `MODULE:NAME` stands for, see `module_of`."""
-    return getattr(import_module(module_of(package, reference)), reference.partition(":")[2])
+        """Module of what is named `MODULE:NAME`, of the package if that has no dot."""
+        module = reference.partition(":")[0]
+        return module if "." in module else f"{self.package}.{module}"
 
 
 @contextmanager

@@ -13,6 +13,7 @@ import csv
 import io
 import json
 import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -22,11 +23,14 @@ from carillon.files.atomic import atomic_path
 from studies.base.conditions import Conditions, read_conditions
 from studies.base.numbers import show
 
-MIN, MAX, KIND = "_min", "_max", "_kind"
+MIN, MAX, KIND, MARK = "_min", "_max", "_kind", "_mark"
 """Endings of columns that tell something about another column."""
 COMMENT = "# "
 UNITS = {"seconds": "s", "modelled": "s", "bytes": "B", "hertz": "Hz", "angle": "rad"}
 """Units of kinds that always have the same one."""
+_ABSENT = object()
+
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class Column:
     kind
         How values are formatted, see `studies.base.numbers.show`.
     unit
-        Unit of the raw value, written into the CSV's head.
+        Unit of the raw value, written into the CSV's head; that of the kind if empty.
     shown
         Whether people see the column; programs always do.
     source
@@ -56,37 +60,27 @@ class Column:
     shown: bool = True
     source: str = field(default="", compare=False)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", self.unit or UNITS.get(self.kind, ""))
 
-def columns_of(text: str) -> list[Column]:
-    """Columns from a text with a line a column, its parts two blanks or more apart.
 
-    They are the key, the label, and at will the kind, a unit in brackets, and `hidden`.
-    `KEY=SOURCE` says where the value lies. With `spread` the columns for the smallest and largest
-    value follow, hidden ones with `spread-hidden`.
+def hidden(key: str, label: str, kind: str = "text", unit: str = "", source: str = "") -> Column:
+    """A column for programs alone."""
+    return Column(key, label, kind, unit, shown=False, source=source)
+
+
+def spread(
+    key: str, label: str, kind: str, unit: str = "", shown: bool = True, source: str = ""
+) -> tuple[Column, ...]:
+    """A column, and those of its smallest and largest value, which may be hidden.
 
     Examples
     --------
-    >>> [column.key for column in columns_of("solid  Solid\\ns=time  Time  seconds  spread")]
-    ['solid', 's', 's_min', 's_max']
+    >>> [column.key for column in spread("s", "Time", "seconds")]
+    ['s', 's_min', 's_max']
     """
-    lines = filter(None, map(str.strip, text.splitlines()))
-    return [column for line in lines for column in _columns_in(line)]
-
-
-def _columns_in(line: str) -> list[Column]:
-    name, label, *rest = re.split(r" {2,}", line)
-    key, _, source = name.partition("=")
-    words = " ".join(rest).split()
-    unit = next((word[1:-1] for word in words if word.startswith("[")), "")
-    flags = {"hidden", "spread", "spread-hidden"}.intersection(words)
-    kind = next((word for word in words if not word.startswith("[") and word not in flags), "text")
-    unit = unit or UNITS.get(kind, "")
-    first = Column(key, label, kind, unit, "hidden" not in flags, source)
-    if not flags - {"hidden"}:
-        return [first]
-    shown = "spread" in flags
     ends = (Column(f"{key}{end}", end[1:], kind, unit, shown) for end in (MIN, MAX))
-    return [first, *ends]
+    return (Column(key, label, kind, unit, source=source), *ends)
 
 
 @dataclass(frozen=True)
@@ -110,7 +104,7 @@ class Table:
     name: str
     caption: str
     columns: list[Column]
-    rows: list[dict[str, Any]] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
     keys: list[str] = field(default_factory=list)
     conditions: Conditions | None = None
 
@@ -119,7 +113,11 @@ class Table:
         """Columns for people."""
         return [column for column in self.columns if column.shown]
 
-    def cells(self, row: dict[str, Any]) -> list[str]:
+    def having(self, values: Mapping[str, Any]) -> list[Row]:
+        """Rows that have these values."""
+        return [row for row in self.rows if all(row.get(key) == values[key] for key in values)]
+
+    def cells(self, row: Row) -> list[str]:
         """A row as people read it."""
         return [show(row.get(column.key), kind_in(row, column)) for column in self.shown]
 
@@ -153,9 +151,77 @@ class Table:
         return f"{self.caption}\n\n{table}{below}"
 
 
-def kind_in(row: dict[str, Any], column: Column) -> str:
+def kind_in(row: Row, column: Column) -> str:
     """Kind of a column's value in a row."""
     return row.get(f"{column.key}{KIND}") or column.kind
+
+
+@dataclass(frozen=True)
+class Tabulation:
+    """How a table is made from results, see `table`."""
+
+    name: str
+    rows: Callable[[Any], Iterable[Row]]
+    caption: str | Callable[[Any], str]
+    columns: Sequence[Column] | Callable[[Any], Sequence[Column]]
+    keys: str = ""
+    conditions: Callable[[Any], Conditions | None] | None = None
+
+    def __call__(self, results: Any) -> Table:
+        """Make the table, its name behind the `prefix` of the results if they have one."""
+        columns = list(self.columns(results) if callable(self.columns) else self.columns)
+        caption = self.caption(results) if callable(self.caption) else self.caption
+        return Table(
+            f"{getattr(results, 'prefix', '')}{self.name}",
+            re.sub(r"\s*\n\s*", " ", caption).strip(),
+            columns,
+            [_picked(row, columns) for row in self.rows(results)],
+            self.keys.split(),
+            self.conditions(results) if self.conditions else None,
+        )
+
+
+def table(
+    caption: str | Callable[[Any], str],
+    columns: Sequence[Column] | Callable[[Any], Sequence[Column]],
+    keys: str = "",
+    conditions: Callable[[Any], Conditions | None] | None = None,
+    name: str = "",
+) -> Callable[[Callable[[Any], Iterable[Row]]], Tabulation]:
+    """Make a table of a function that yields its rows from results.
+
+    Rows hold values by key or source; a column without its value is empty.
+
+    Parameters
+    ----------
+    caption
+        What the table shows, over which modes, against which base; it, and the columns, may depend
+        on the results. Lines are joined.
+    keys
+        Columns that tell the rows apart, the first one if there are none.
+    conditions
+        Says how the results were measured.
+    name
+        Of the table, that of the function if empty.
+    """
+
+    def of_rows(rows: Callable[[Any], Iterable[Row]]) -> Tabulation:
+        own = name or rows.__name__.replace("_", "-")
+        return Tabulation(own, rows, caption, columns, keys, conditions)
+
+    return of_rows
+
+
+def _picked(row: Row, columns: Iterable[Column]) -> Row:
+    values = {column.key: _value(row, column.source or column.key) for column in columns}
+    return {key: value for key, value in values.items() if value is not _ABSENT}
+
+
+def _value(row: Any, source: str) -> Any:
+    if source in row:
+        return row[source]
+    first, _, rest = source.partition(".")
+    return _value(row[first], rest) if rest and isinstance(row.get(first), dict) else _ABSENT
 
 
 def write_table(table: Table, folder: str | Path) -> None:
@@ -209,7 +275,7 @@ def _column_of(head: str, kind: str) -> Column:
 
 
 def _row_of(columns: list[Column], texts: list[str]) -> dict[str, Any]:
-    row: dict[str, Any] = dict(zip((column.key for column in columns), texts, strict=True))
+    row: Row = dict(zip((column.key for column in columns), texts, strict=True))
     return {column.key: _value_of(row[column.key], kind_in(row, column)) for column in columns}
 
 

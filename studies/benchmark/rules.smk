@@ -24,4 +24,4 @@ rule time_methods:
         how=lambda wildcards: timing.methods(config, wildcards.model),
         forest=forest_argument,
     shell:
-        solver_command("benchmark {params.model:q} {params.how:q} {params.forest:q}")
+        study_command("benchmark {params.model:q} {params.how:q} {params.forest:q}")

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from carillon.command_line.picture_formats import require_plottable
 from carillon.files.atomic import atomic_path
 from studies.base.colours import COLOURS, MUTED
-from studies.base.entry import Row
 from studies.base.style import plain_numbers
+from studies.base.table import Row
 from workflow.report.blocks_tables import compared, kind_of, kinds_of, method_of
 
 MARKS: tuple[tuple[str, str], ...] = (

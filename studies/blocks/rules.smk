@@ -18,5 +18,5 @@ rule rate_forests:
         source=source("studies.blocks.command"),
         blocks=block_arguments(OWN.forests),
     shell:
-        "python -m forests table --model {input:q} {params.blocks:q}"
+        "python -m carillon study table --model {input:q} {params.blocks:q}"
         " --out {output:q} > {log:q} 2>&1"

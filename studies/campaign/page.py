@@ -1,46 +1,81 @@
-"""The campaign as one page."""
+"""The campaign as one page; pages of the cells lie below it."""
 
 from __future__ import annotations
 
 from typing import Any
+from urllib.parse import quote
 
-from studies.base.page import rendered
+from markupsafe import Markup
+
+from studies.base.page import StudyPage, origins, section
+from studies.base.parts import article, bullets, element, facts, grid, html, note, prose
 from studies.base.table import Table
 from studies.campaign.results import PASSED, Campaign, end_of
 
 
-def page(study: Campaign, tables: dict[str, Table]) -> str:
-    """Build the page from the tables of a campaign; pages of the cells lie below it."""
-    return rendered(
-        "studies/campaign/page.html.j2",
+def page(study: Campaign, tables: dict[str, Table]) -> StudyPage:
+    """Build the page from the tables of a campaign."""
+    about = html(
+        """A cell computes the {modes:count} lowest modes of a solid with SLEPc, with HCMS + EC and
+        on the coarsened mesh, and judges them as <code>carillon validate</code> does. Limits of
+        the solvers follow from <code>solver.tolerance</code>, {tolerance:small}; coarsened
+        frequencies may be off by {frequency_rms:percent} rms and {frequency_worst:percent} in the
+        worst mode. The verdict for programs is in <span class="file">verdict.json</span> and
+        <span class="file">junit.xml</span> beside this page.""",
+        **study.part | {"tolerance": study.config["solver"]["tolerance"]},
+    )
+    cells = [_cell(study, row) for row in tables["cells"].rows]
+    judgement = f"judgement {'passed' if study.passed else 'failed'}"
+    return StudyPage(
         title="Validation of solids, materials, seeds and ranks",
-        config=study.config,
-        part=study.part,
-        passed=study.passed,
-        headline=study.headline,
-        without=study.without,
-        cells=[_cell(study, row) for row in tables["cells"].rows],
-        tables=tables,
+        kicker="campaign",
+        lede=f"""{len(cells)} validations: every solid with every material, seed and number of
+            ranks. Where does a spectrum go wrong?""",
+        sections=[
+            section(
+                "verdict",
+                "Verdict",
+                element("p", study.headline, class_=judgement),
+                note(study.without),
+                prose(about),
+                grid(tables["solids"]),
+            ),
+            section("cells", "Cells, the worst first", *cells, menu="Cells"),
+            section("table", "Table", grid(tables["cells"])),
+            origins(tables["provenance"]),
+        ],
     )
 
 
-def _cell(study: Campaign, row: dict[str, Any]) -> dict[str, Any]:
+def _cell(study: Campaign, row: dict[str, Any]) -> Markup:
     """What the page says of a cell."""
     key = (row["model"], row["material"], row["seed"], row["ranks"])
     cell = next(
         each for each in study.found if (each.solid, each.material, each.seed, each.ranks) == key
     )
     result = study.found[cell]
-    missed = [each for each in result["criteria"] if each["verdict"] == "missed"]
-    return {
-        "label": study.label(cell),
-        "end": end_of(result),
-        "passed": end_of(result) == PASSED,
-        "reason": result["reason"],
-        "advice": result.get("advice"),
-        "missed": missed,
-        "what": row["what"],
-        "command": result["command"],
-        "seconds": result["seconds"],
-        "page": f"cells/{cell.path}/{result['page']}" if "page" in result else None,
-    }
+    passed = end_of(result) == PASSED
+    led = ""
+    if "page" in result:
+        target = quote(f"cells/{cell.path}/{result['page']}")
+        led = html('<a href="{}">Page of the cell</a>', target)
+    if result["reason"] is not None:
+        told = element("p", result["reason"])
+    elif passed:
+        told = html("<p>Nearest to its limit: {what}.</p>", **row)
+    else:
+        missed = (each for each in result["criteria"] if each["verdict"] == "missed")
+        lines = (html("{group}: {label}: {shown}, required {required}", **each) for each in missed)
+        told = element("p", result.get("advice")) + bullets(lines)
+    return article(
+        None,
+        study.label(cell),
+        facts(
+            element("span", end_of(result), class_="met" if passed else "missed"),
+            html("<span>{seconds:seconds}</span>", **result),
+            led,
+        ),
+        told,
+        element("pre", result["command"], class_="config"),
+        class_="cell",
+    )

@@ -1,4 +1,4 @@
-# Validations of solids x materials x seeds x ranks: `snakemake campaign`, no part of the default run.
+# Validations of solids x materials x seeds x ranks: `snakemake campaign`.
 from studies.campaign import study as campaign_study
 from studies.campaign.cells import Cell, validation_arguments
 

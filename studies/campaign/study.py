@@ -7,10 +7,9 @@ from studies.campaign.cells import cells_of
 
 CAMPAIGN = Study(
     name="campaign",
-    package="studies.campaign",
-    folder="campaign",
     title="Validations of solids, materials, seeds and ranks",
     results="results:Campaign",
-    page="page:page",
+    tables=("cells", "solids", "provenance"),
+    target=False,
     measured=lambda config: [f"cells/{cell.path}.json" for cell in cells_of(config)],
 )

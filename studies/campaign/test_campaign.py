@@ -11,13 +11,12 @@ import pytest
 import yaml
 
 from studies.campaign.cells import cells_of, validation_arguments
-from studies.campaign.page import page as rendered
 from studies.campaign.results import FAILED, MISSED, PASSED, WRONG, Campaign, end_of
 from studies.campaign.running import validated
 from studies.campaign.study import CAMPAIGN
 from studies.campaign.verdict import as_json, as_junit
 from studies.campaign.verdict import main as verdict
-from tests.pages import Page, assert_self_contained
+from tests.pages import assert_self_contained, page_of
 from tests.workflow_runs import PROFILE, TINY, planned, snakemake
 from workflow import settings
 from workflow.__main__ import main
@@ -140,9 +139,7 @@ def test_a_campaign_whose_cells_all_pass_passes(study, tmp_path):
 
 
 def test_the_page_shows_every_cell_and_how_to_repeat_it(study, tmp_path):
-    tables = {name: make(study) for name, make in CAMPAIGN.entries.items()}
-    (tmp_path / "page.html").write_text(rendered(study, tables))
-    page = Page(tmp_path / "page.html")
+    page = page_of(CAMPAIGN, study, tmp_path / "page.html")
     assert_self_contained(page)
     source = page.source
     order = [source.index(f"a {end}&#39;") for end in (FAILED, WRONG, MISSED, PASSED)]

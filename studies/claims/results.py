@@ -13,6 +13,7 @@ from forests import default as default_forests
 from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.table import Table, read_csv_table, read_table
+from studies.claims.study import FULL, SCENE_PICTURE, SCENE_TABLE
 from workflow import settings
 
 HERE = Path(__file__).parent
@@ -20,17 +21,11 @@ REFERENCE = "results/reference/znver4"
 """Tables of a complete run that are kept in a checkout; an installed package has none."""
 MEASURED = HERE / "measured.json"
 """Rows of `carillon benchmark` that take too long for a run, each with its command."""
-SCENE_TABLE = "tables/scene_spectra.json"
-SCENE_PICTURE = "figures/scene-spectrograms.png"
-FULL = "paper"
-"""Folder of `snakemake figures` below that of a run."""
 
 
 @dataclass(frozen=True)
 class Claims(Results):
     """The folder of the claims, below that of a run."""
-
-    study = ""
 
     @cached_property
     def paper(self) -> dict[str, Any]:

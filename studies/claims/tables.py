@@ -9,8 +9,8 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from carillon.files.yaml_input import read_own_yaml
-from studies.base.entry import Row
 from studies.base.numbers import show
+from studies.base.table import Column, Row, hidden, table
 from studies.claims.findings import LESS, NOT, REPRODUCED
 from studies.claims.measures import MEASURES
 from studies.claims.results import FULL, MEASURED, SCENE_TABLE, Claims
@@ -29,6 +29,21 @@ COMMANDS = {
 """What makes a file, by the beginning of its name."""
 
 
+@table(
+    """Figures are read from the tables that are listed below, or from measurements that are
+    kept with the command that made them; the paper’s are quoted with their place. In part:
+    something of the claim holds, or it was tried on less than the claim says. Less is needed:
+    of what the paper says that it costs.""",
+    [
+        hidden("key", "Key"),
+        Column("place", "Place"),
+        Column("claim", "The paper’s claim"),
+        Column("measured", "Measured here"),
+        Column("verdict", "Verdict"),
+        Column("why", "Why"),
+        Column("files", "From"),
+    ],
+)
 def claims(results: Claims) -> Iterator[Row]:
     """A row a claim: place, claim, what was measured, verdict, why."""
     texts = Environment(undefined=StrictUndefined)
@@ -72,6 +87,25 @@ def printed(paper: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+@table(
+    """Times of Fig. 11 as printed, and those measured here on meshes of about the paper’s
+    unknowns. Both compute 256 modes in full; the machines are years apart.""",
+    [
+        Column("solid", "Solid"),
+        Column("paper_unknowns", "Paper: unknowns", "count"),
+        Column("paper_arpack", "ARPACK", "seconds"),
+        Column("paper_all", "DDFEM* + HCMS + EC", "seconds"),
+        Column("paper_ratio", "Speed-up", "times"),
+        Column("unknowns", "Here: unknowns", "count"),
+        Column("slepc", "SLEPc", "seconds"),
+        Column("cold_seconds", "cold", "seconds"),
+        Column("warm_seconds", "warm", "seconds"),
+        Column("cold", "Speed-up, cold", "times"),
+        Column("warm", "warm", "times"),
+        Column("error", "Frequencies, rms", "percent"),
+        Column("note", "Note"),
+    ],
+)
 def solids(results: Claims) -> Iterator[Row]:
     """Fig. 11 solid by solid: the paper's times, and those here if the mesh is at hand."""
     full = results.in_full("methods") or results.of_run("methods")
@@ -111,6 +145,17 @@ def _measured(row: Row) -> Row:
     }
 
 
+@table(
+    """Files that the figures above are read from, below the folder of this run or of the
+    checkout.""",
+    [
+        Column("file", "File"),
+        Column("command", "Made by"),
+        Column("commit", "Commit"),
+        Column("date", "Date"),
+        Column("machine", "Processor"),
+    ],
+)
 def sources(results: Claims) -> Iterator[Row]:
     """Every file that figures are from, what made it, and where it was measured."""
     for name in dict.fromkeys(results.read):

@@ -8,7 +8,6 @@ import yaml
 from studies.base.table import Column, Table, read_csv_table, write_table
 from studies.claims.findings import IN_PART, LESS, NOT, REPRODUCED, UNMEASURED, Finding
 from studies.claims.measures import MEASURES
-from studies.claims.page import page
 from studies.claims.results import REFERENCE, Claims
 from studies.claims.study import CLAIMS
 from studies.claims.tables import TEXTS
@@ -108,8 +107,8 @@ def test_what_a_run_did_not_measure_is_said(run, monkeypatch):
 
 def test_the_page_names_the_dragons_and_what_made_each_table(run):
     claims = Claims(run / CLAIMS.folder)
-    tables = {name: make(claims) for name, make in CLAIMS.entries.items()}
-    text = page(claims, tables)
+    tables = CLAIMS.made(claims)
+    text = CLAIMS.build(claims, tables)
     assert "Asian Dragon, Chinese Dragon" in text
     assert "This run has no scene from both" in text
     commands = {row["file"]: row["command"] for row in tables["sources"].rows}
@@ -126,8 +125,8 @@ def test_a_scene_from_both_modes_is_shown_where_it_is(run):
         table("scene_spectra", [{"title": "coarse", "distance_decibels": 2.5}]), run / "tables"
     )
     claims = Claims(run / CLAIMS.folder)
-    tables = {name: make(claims) for name, make in CLAIMS.entries.items()}
-    assert 'data-table="scene_spectra"' in page(claims, tables)
+    tables = CLAIMS.made(claims)
+    assert 'data-table="scene_spectra"' in CLAIMS.build(claims, tables)
     assert "coarse 2.5 dB" in found(run, "scene").text
     sources = {row["file"]: row["command"] for row in tables["sources"].rows}
     assert sources["tables/scene_spectra.json"] == "snakemake scene_spectra"

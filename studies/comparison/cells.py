@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from studies.base.entry import Row
 from studies.base.numbers import MISSING, show
-from studies.base.table import KIND, MAX, MIN, Column, Table, kind_in
+from studies.base.table import KIND, MAX, MIN, Column, Row, Table, kind_in
 from studies.comparison.noise import UNJUDGED, Value, verdict
 
 KEYS = ["table", "row", "column"]

@@ -10,10 +10,10 @@ import pandas as pd
 
 from carillon.files.atomic import atomic_path
 from studies.base.conditions import LABELS
-from studies.base.entry import Row, tables_of
 from studies.base.numbers import show
-from studies.base.page import rendered
-from studies.base.table import Table
+from studies.base.page import StudyPage, section
+from studies.base.parts import bullets, div, element, grid, html, listed, prose
+from studies.base.table import Column, Row, Table, hidden, table
 from studies.comparison.cells import ENDS, KEYS
 from studies.comparison.comparison import SIDES, Comparison
 from studies.comparison.differences import Difference, dates
@@ -28,7 +28,6 @@ MOST_MOVED = 25
 MOST_LISTED = 200
 """Numbers of a table up to which the page lists all of them."""
 TITLE = "What moved"
-TABLES = tables_of("studies.comparison")
 RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
 CLASSES = {"worse": WORSE, "better": BETTER, "other": OTHER}
 MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
@@ -39,9 +38,9 @@ def write(comparison: Comparison, folder: Path) -> None:
     """Write `comparison.csv`, `comparison.md` and `comparison.html`."""
     make_folder(folder)
     for ending, text in (
-        ("csv", TABLES[NAME](comparison.cells).as_csv()),
+        ("csv", EVERY_NUMBER(comparison.cells).as_csv()),
         ("md", as_markdown(comparison)),
-        ("html", as_page(comparison)),
+        ("html", str(as_page(comparison))),
     ):
         with atomic_path(folder / f"{NAME}.{ending}") as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -91,33 +90,70 @@ def as_markdown(comparison: Comparison) -> str:
             parts.append(f"And {len(moved) - MOST_MOVED:,} more, see {NAME}.csv.")
     if comparison.moved.empty:
         parts.append("Nothing.")
-    parts += ["## By table", TABLES["counts"](comparison.cells).as_markdown()]
+    parts += ["## By table", counts(comparison.cells).as_markdown()]
     for side, only in _one_sided(comparison).items():
         parts += [f"## {side}", "\n".join(f"- {name}" for name in only)]
     parts += ["## Rules", "\n".join(f"- {kind}: {rule}." for kind, rule in RULES.items())]
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
-def as_page(comparison: Comparison) -> str:
+def as_page(comparison: Comparison) -> StudyPage:
     """The comparison as one self-contained page."""
     by_table = _by_table(comparison.cells)
-    return rendered(
-        "studies/comparison/page.html.j2",
+    all_of_them = html('see <span class="file">{}.csv</span>', NAME)
+    differing = [grid(table, caption=False) for table in _differing(comparison)]
+    same = prose("Machine, versions, commit and configuration are the same.")
+    moved = []
+    for path, cells in _by_table(comparison.moved):
+        table = _listed(f"{path}-moved", cells.head(MOST_MOVED))
+        moved += [element("h3", path), grid(table, caption=False, by="verdict")]
+        if (more := len(cells) - MOST_MOVED) > 0:
+            moved.append(prose(html("And {:count} more, {}.", more, all_of_them)))
+    tables = [_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED]
+    unlisted = ", ".join(path for path, cells in by_table if len(cells) > MOST_LISTED)
+    counted = counts(comparison.cells)
+    one_sided = _one_sided(comparison)
+    only = (element("p", f"{side}:") + bullets(names) for side, names in one_sided.items())
+    rules = bullets(f"{kind}: {rule}." for kind, rule in RULES.items())
+    return StudyPage(
         title=TITLE,
-        sides=_sides(comparison),
-        summary=summary(comparison),
-        differing=_differing(comparison),
-        cautions=_caution(comparison),
-        moved=[
-            (path, _listed(f"{path}-moved", moved.head(MOST_MOVED)), len(moved))
-            for path, moved in _by_table(comparison.moved)
+        kicker="comparison of two runs",
+        lede=f"{summary(comparison)}.",
+        sections=[
+            section(
+                "conditions",
+                "Conditions",
+                prose(_sides(comparison)),
+                *(differing or [same]),
+                *map(prose, _caution(comparison)),
+            ),
+            section("moved", "Moved", *(moved or [prose("Nothing moved beyond noise.")])),
+            section(
+                "tables",
+                "By table",
+                grid(counted, caption=False),
+                prose(counted.caption),
+                *(
+                    listed(f"{each.name}, number by number", grid(each, caption=False, by="row"))
+                    for each in tables
+                ),
+                prose(unlisted and html("Too long for this page: {}, {}.", unlisted, all_of_them)),
+            ),
+            section("only", "On one side", div("prose", *only)) if one_sided else None,
+            section(
+                "rules",
+                "Rules",
+                prose(
+                    """A number counts as moved when it differs by more than noise. What that is
+                    depends on the number:"""
+                ),
+                div("prose", rules),
+            ),
         ],
-        most=MOST_MOVED,
-        counts=TABLES["counts"](comparison.cells),
-        listed=[_listed(path, cells) for path, cells in by_table if len(cells) <= MOST_LISTED],
-        unlisted=[path for path, cells in by_table if len(cells) > MOST_LISTED],
-        one_sided=_one_sided(comparison),
-        rules=RULES,
+        footer=html(
+            'Every number of both folders, raw: <span class="file">{}.csv</span> beside this page.',
+            NAME,
+        ),
     )
 
 
@@ -135,6 +171,39 @@ def records(cells: pd.DataFrame) -> list[Row]:
     return rows
 
 
+EVERY_NUMBER = table(
+    "Every number of both folders.",
+    [Column(name, name) for name in RAW],
+    keys="table row column",
+    name=NAME,
+)(records)
+LISTED = table(
+    "",
+    [
+        hidden("table", "Table"),
+        Column("row", "Row"),
+        Column("label", "Quantity"),
+        Column("verdict", "Verdict"),
+        hidden("verdict_mark", "Its mark", source="mark"),
+        Column("before", "Baseline", source="before_shown"),
+        Column("now", "This run", source="now_shown"),
+        Column("ratio", "Ratio", "times"),
+    ],
+    keys="table row column",
+)(records)
+
+
+@table(
+    """Numbers that both folders have, by table. Worse is slower, less accurate or larger,
+    better the opposite; what changed otherwise is neither.""",
+    [
+        Column("table", "Table"),
+        Column("compared", "Compared", "count"),
+        Column("worse", "Worse", "count"),
+        Column("better", "Better", "count"),
+        Column("other", "Changed otherwise", "count"),
+    ],
+)
 def counts(cells: pd.DataFrame) -> list[Row]:
     """How many numbers of each table were compared, and what became of them."""
     of = {name: cells["verdict"].isin(verdicts) for name, verdicts in CLASSES.items()}
@@ -143,13 +212,16 @@ def counts(cells: pd.DataFrame) -> list[Row]:
     return rows
 
 
-def differing(differences: list[Difference]) -> list[Row]:
-    """What is not the same, for people."""
-    return [{**each, "where": each["where"] or "all"} for each in differences]
+def _differing_table(name: str, what: str, differences: list[Difference], apart: bool) -> Table:
+    """What is not the same, and for which tables where `apart`."""
+    columns = [Column("what", what), Column("before", "Baseline"), Column("now", "This run")]
+    columns.append(Column("where", "Tables", shown=apart))
+    rows = [{**each, "where": each["where"] or "all"} for each in differences]
+    return Table(name, "", columns, rows)
 
 
 def _listed(name: str, cells: pd.DataFrame) -> Table:
-    return replace(TABLES["listed"](cells), name=name)
+    return replace(LISTED(cells), name=name)
 
 
 def _by_table(cells: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
@@ -175,7 +247,11 @@ def _caution(comparison: Comparison) -> list[str]:
 
 
 def _differing(comparison: Comparison) -> list[Table]:
-    tables = (TABLES[name](getattr(comparison, name)) for name in ("conditions", "configuration"))
+    apart = any(each["where"] for each in comparison.conditions)
+    tables = (
+        _differing_table("conditions", "Condition", comparison.conditions, apart),
+        _differing_table("configuration", "Key", comparison.configuration, apart=False),
+    )
     return [table for table in tables if table.rows]
 
 

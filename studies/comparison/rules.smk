@@ -11,7 +11,11 @@ if config["baseline"]:
         raise WorkflowError(f"baseline: {error}") from None
 
 
-include: "functions.smk"
+def require_baseline(wildcards):
+    """No files: they may be those of the rule `reference`, which must not be made anew for this."""
+    if not config["baseline"]:
+        raise WorkflowError("baseline: names no folder, run with --config baseline=FOLDER")
+    return []
 
 
 rule compare:
@@ -27,7 +31,7 @@ rule compare:
         baseline=config["baseline"],
         results=lambda wildcards, input: str(Path(input.config).parent),
     shell:
-        "python -m workflow compare {params.baseline:q} {params.results:q}"
+        "python -m carillon study compare-runs {params.baseline:q} {params.results:q}"
         " --out {params.results:q}/comparison 2>&1 | tee {log:q}"
 
 

@@ -22,5 +22,5 @@ rule follow_convergence:
             config["convergence"], model_modes(wildcards), input.truth
         ),
     shell:
-        "python -m solver convergence {params.model:q} {params.how:q}"
+        "python -m carillon study convergence {params.model:q} {params.how:q}"
         " --out {output:q} > {log:q} 2>&1"

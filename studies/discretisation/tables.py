@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from studies.base.cases import Case
-from studies.base.conditions import IN_COLUMNS, NOT_TIMED, Record, Repeats, measured
-from studies.base.entry import Row
+from studies.base.conditions import IN_COLUMNS, NOT_TIMED, Repeats, measured
+from studies.base.table import Column, Row, hidden, spread, table
 from studies.discretisation.results import SOLID, VOXELS, DiscretisationStudy
 
 FIRST = 7
@@ -27,17 +27,42 @@ WAYS = {
 PHASES = ("mesh", "material", "model", "solve")
 
 
-def _records(study: DiscretisationStudy) -> dict[str, Record]:
-    return {study.label(case): rating["provenance"] for case, rating in study.ratings.items()}
-
-
 def _repeats(study: DiscretisationStudy) -> Repeats:
     return Repeats(f"{study.runs}, all ways in turn, after one on a small box", IN_COLUMNS)
 
 
-UNTIMED, TIMED = measured(_records, NOT_TIMED), measured(_records, _repeats)
+UNTIMED, TIMED = (
+    measured(lambda study: study.records, NOT_TIMED),
+    measured(lambda study: study.records, _repeats),
+)
 
 
+@table(
+    lambda study: (
+        f"""Relative errors of the frequencies of modes {FIRST}–{study.last}, modes matched by
+        index, against the solid itself and against its voxels: root mean square over all
+        solids, each weighing the same, rms of the median solid, and the worst single frequency,
+        negative if too low. Unknowns and wall time are those of the median solid, over those of
+        its voxels. The doubt is the error that the truth itself may have."""
+    ),
+    [
+        Column("material", "Material"),
+        Column("way", "Way"),
+        Column("solid_rms", "Solid, rms", "percent"),
+        Column("solid_median", "median", "percent"),
+        Column("solid_worst", "worst", "percent"),
+        hidden("solid_where", "at"),
+        Column("voxels_rms", "Voxels, rms", "percent"),
+        Column("voxels_median", "median", "percent"),
+        Column("voxels_worst", "worst", "percent"),
+        hidden("voxels_where", "at"),
+        Column("n_dofs", "Unknowns over voxels’", "score"),
+        Column("seconds", "Time over voxels’", "score"),
+        Column("doubt", "Doubt", "percent"),
+    ],
+    keys="material way",
+    conditions=TIMED,
+)
 def summary(study: DiscretisationStudy) -> Iterator[Row]:
     """Errors by material and way over all solids, and what they cost beside the voxels."""
     for material in study.part["materials"]:
@@ -72,6 +97,42 @@ def _root_mean_square(values: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+@table(
+    lambda study: (
+        f"""Relative errors of the frequencies of modes {FIRST}–{study.last}, modes matched by
+        index, against the solid itself and against its voxels. Seconds are wall time from the
+        surface to the modes: mesh, moduli of its voxels by the material, model, and modes to
+        {next(iter(study.ratings.values()))["tolerance"]:g}, the coarsening and, of the
+        refined model, all its steps included; median, least and greatest of the runs."""
+    ),
+    [
+        hidden("model", "Model"),
+        Column("title", "Solid"),
+        hidden("resolution", "Resolution", "count"),
+        Column("material", "Material"),
+        hidden("name", "Name"),
+        Column("way", "Way"),
+        Column("unknowns", "Unknowns", "count", source="n_dofs"),
+        Column("solid_rms", "Solid, rms", "percent", source="against.solid.rms"),
+        Column("solid_worst", "worst", "percent", source="against.solid.worst"),
+        hidden("solid_mode", "at mode", "count", source="against.solid.worst_mode"),
+        Column("voxels_rms", "Voxels, rms", "percent", source="against.voxels.rms"),
+        Column("voxels_worst", "worst", "percent", source="against.voxels.worst"),
+        hidden("voxels_mode", "at mode", "count", source="against.voxels.worst_mode"),
+        *spread("seconds", "Time", "seconds"),
+        *(
+            column
+            for phase in PHASES
+            for column in (
+                hidden(
+                    f"{phase}_seconds", f"{phase.capitalize()}", "seconds", source=f"phases.{phase}"
+                ),
+            )
+        ),
+    ],
+    keys="model resolution material name",
+    conditions=TIMED,
+)
 def cases(study: DiscretisationStudy) -> Iterator[Row]:
     """Errors, unknowns and wall time of every way in every case."""
     for case in study.ratings:
@@ -81,6 +142,24 @@ def cases(study: DiscretisationStudy) -> Iterator[Row]:
             yield {**way, **study.identity(case), **ends, "name": name, "way": WAYS[name]}
 
 
+@table(
+    lambda study: (
+        f"""Frequencies of the solids themselves are those of finite cells on a lattice twice as
+        fine, less half of what may be left of the difference from finite cells on the lattice
+        of the voxels; the doubt is as much: rms and largest over modes {FIRST}–{study.last}."""
+    ),
+    [
+        hidden("model", "Model"),
+        Column("title", "Solid"),
+        Column("resolution", "Resolution", "count"),
+        Column("material", "Material"),
+        Column("unknowns", "Unknowns", "count", source="n_dofs"),
+        Column("doubt_rms", "Doubt, rms", "percent"),
+        Column("doubt_worst", "largest", "percent"),
+    ],
+    keys="model resolution material",
+    conditions=UNTIMED,
+)
 def truths(study: DiscretisationStudy) -> Iterator[Row]:
     """What is known of the solid itself in every case."""
     for case, rating in study.ratings.items():

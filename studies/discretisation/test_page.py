@@ -9,13 +9,10 @@ import yaml
 
 from carillon.records.measurement import measured
 from studies.base.cases import cases_of
-from studies.base.study import named
-from studies.base.style import save
-from studies.base.table import write_table
 from studies.discretisation.results import DiscretisationStudy
 from studies.discretisation.study import DISCRETISATION
 from studies.discretisation.tables import WAYS
-from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.pages import assert_same_numbers, assert_self_contained, page_of
 
 summary, cases, truths = (DISCRETISATION.entries[name] for name in ("summary", "cases", "truths"))
 MODEL = {"title": "", "mesh": "builtin:fork", "resolutions": [8], "components": "error"}
@@ -85,21 +82,10 @@ def test_every_case_has_a_row_a_way(study):
 
 
 def test_the_page_holds_its_tables_and_figures(study):
-    description = DISCRETISATION
-    for folder in ("tables", "figures"):
-        (study.folder / folder).mkdir()
-    tables = {name: make(study) for name, make in description.entries.items()}
-    for table in tables.values():
-        write_table(table, study.folder / "tables")
-    for figure in description.figures:
-        drawn = study.folder / "figures" / figure.file
-        save(named(description.package, figure.draw)(study), [drawn.with_suffix(".svg")])
-    path = study.folder / "report.html"
-    path.write_text(named(description.package, description.page)(study, tables))
-    page = Page(path)
+    page = page_of(DISCRETISATION, study, study.folder / "report.html")
     assert_self_contained(page)
     assert {"plot-unknowns", "plot-seconds"} <= set(page.ids)
-    for name in tables:
+    for name in DISCRETISATION.tables:
         assert_same_numbers(page, study.folder / "tables", name)
 
 

@@ -2,25 +2,47 @@
 
 from __future__ import annotations
 
-from studies.base.page import inline, rendered
+from studies.base.page import StudyPage, origins, section
+from studies.base.parts import grid, plot, prose
 from studies.base.table import Table
 from studies.figures.results import Figures
-from workflow.report.convergence_tables import convergence_sentences
-from workflow.report.page import plots
-from workflow.report.scaling_tables import assumptions
+from workflow.report.page import convergence_plots, modelled, scaling_plots
 
 
-def page(figures: Figures, tables: dict[str, Table]) -> str:
+def page(figures: Figures, tables: dict[str, Table]) -> StudyPage:
     """Build the page from tables and plots; nothing is computed anew."""
-    return rendered(
-        "studies/figures/page.html.j2",
+    times = "Medians of the table above, with least and greatest; the axis is logarithmic."
+    return StudyPage(
         title="The paper’s figures",
-        config=figures.part,
-        tables=tables,
-        without=figures.without,
-        sentences=convergence_sentences(tables["convergence"]),
-        times=inline(figures.figure("times.svg")),
-        convergence=plots(figures, "convergence", figures.convergence),
-        scaling=plots(figures, "scaling", figures.scaling),
-        assumptions=assumptions(figures),
+        kicker="reproduction of the tables",
+        lede="""All methods on the same solids, machine and cores; how fast corrections converge
+            from which start; and how the solver scales over ranks.""",
+        sections=[
+            section(
+                "times",
+                "Times",
+                prose(figures.without),
+                grid(tables["methods"]),
+                plot(figures.drawn("times"), times, "times"),
+                grid(tables["ratios"], by="model"),
+                grid(tables["spreads"], by="model"),
+                menu="Times (Fig. 11)",
+            ),
+            section(
+                "convergence",
+                "Convergence of the error correction",
+                convergence_plots(figures, tables["convergence"], figures.part["steps"]),
+                grid(tables["convergence"], by="start"),
+                menu="Convergence (Fig. 10)",
+            ),
+            section(
+                "scaling",
+                "Scaling over ranks",
+                scaling_plots(figures),
+                modelled(figures),
+                grid(tables["scaling"], by="kind"),
+                menu="Scaling",
+            ),
+            origins(tables["provenance"]),
+        ],
     )

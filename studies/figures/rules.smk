@@ -1,15 +1,9 @@
-# The paper's Fig. 10 and 11 and the scaling over ranks, in full: `snakemake figures`, no part of the
-# default run.
+# The paper's Fig. 10 and 11 and the scaling over ranks, in full: `snakemake figures`.
 from studies.figures import study as figures_study
 
 
 wildcard_constraints:
     shape="|".join(config["figures"]["models"]),
-
-
-rule figures:
-    input:
-        f"{place(figures_study.FIGURES)}/report.html",
 
 
 # Rules that time what they do take all cores, although some use one. The forests are those of the

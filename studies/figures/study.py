@@ -15,11 +15,10 @@ MEASURES = {
 
 FIGURES = Study(
     name="figures",
-    package="studies.figures",
     folder="paper",
     title="Times, convergence and scaling in full",
     results="results:Figures",
-    page="page:page",
+    tables=("convergence", "methods", "ratios", "spreads", "scaling", "provenance"),
     measured=lambda config: solids.measured_files(config, MEASURES),
     figures=(
         Figure("times", "workflow.report.methods_plot:methods_figure", "tables/methods.json"),

@@ -113,7 +113,7 @@ def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
     page = Page(finished / "report.html")
     assert_self_contained(page)
     assert {"plot-times", "plot-bar-convergence", "plot-bar-scaling"} <= set(page.ids)
-    for name in FIGURES.entries:
+    for name in FIGURES.tables:
         assert_same_numbers(page, finished / "tables", name)
     for name in ("times", "bar-convergence", "bar-scaling"):
         assert (finished / "figures" / f"{name}.png").stat().st_size > 5000

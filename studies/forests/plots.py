@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from carillon.files.atomic import atomic_path
 from studies.base.colours import COLOURS, MUTED
-from studies.base.entry import Row
 from studies.base.style import named_rows, plain_numbers
+from studies.base.table import Row
 from studies.blocks.plot import error_over_cost
 from studies.forests.results import ForestsStudy
 

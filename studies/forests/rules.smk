@@ -1,5 +1,4 @@
-# What the default forests are worth, block by block: `snakemake forests_study`, no part of the
-# default run.
+# What the default forests are worth, block by block: `snakemake forests_study`.
 from studies.forests import study as forests_study
 
 FORESTS_STUDY = place(forests_study.FORESTS)
@@ -7,11 +6,6 @@ STUDIED_FORESTS = (
     settings.forest_files(config["forests_study"]["model"]) or f"{DEFAULT_FOLDER}/forests.h5"
 )
 STUDY_TRAINING = forests_study.trainings(config)
-
-
-rule forests_study:
-    input:
-        f"{FORESTS_STUDY}/report.html",
 
 
 use rule describe_forests as describe_studied_forests with:
@@ -53,7 +47,7 @@ rule benchmark_forests:
         blocks=config["forests_study"]["timed_blocks"],
         largest=config["forests_study"]["largest"],
     shell:
-        "python -m forests benchmark --forest {input:q} --blocks {params.blocks:q}"
+        "python -m carillon study benchmark-forests --forest {input:q} --blocks {params.blocks:q}"
         " --largest {params.largest:q} --out {output:q} > {log:q} 2>&1"
 
 
@@ -82,7 +76,7 @@ rule compare_trainings:
             for word in options({"only": name})
         ],
     shell:
-        "python -m forests variants {input:q} {params.training:q} --max-leaves {params.leaves:q}"
+        "python -m carillon study variants {input:q} {params.training:q} --max-leaves {params.leaves:q}"
         " {params.variants:q} --workers {threads} --out {output:q} > {log:q} 2>&1"
 
 
@@ -103,5 +97,5 @@ rule follow_learning:
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:
-        "python -m forests curve {input:q} {params.training:q} --rows {params.rows:q}"
+        "python -m carillon study curve {input:q} {params.training:q} --rows {params.rows:q}"
         " --workers {threads} --out {output:q} > {log:q} 2>&1"

@@ -12,10 +12,9 @@ PARTS = ("model", "blocks", "benchmark", "variants", "curve")
 FORESTS = Study(
     name="forests_study",
     package="studies.forests",
-    folder="forests_study",
     title="The default forests",
     results="results:ForestsStudy",
-    page="page:page",
+    tables=("model", "blocks", "every-block", "variants", "curve", "cost", "sizes", "provenance"),
     measured=lambda config: [f"{part}.json" for part in PARTS],
     figures=(
         Figure("blocks", "plots:blocks_figure", "blocks.json"),

@@ -6,22 +6,58 @@ from collections.abc import Iterator
 from typing import Any
 
 from studies.base.conditions import IN_COLUMNS, ONE_COLD_RUN, Repeats, measured
-from studies.base.entry import Row
 from studies.base.numbers import show
+from studies.base.table import Column, Row, hidden, spread, table
 from studies.forests.results import ForestsStudy
-from workflow.report.blocks_tables import MEASURE as MEASURE
-from workflow.report.blocks_tables import MEASURED as MEASURED
-from workflow.report.blocks_tables import kind_of, on_blocks
+from workflow.report.blocks_tables import MEASURE, MEASURED, kind_of, on_blocks
+from workflow.report.blocks_tables import blocks as blocks
 from workflow.report.forests_tables import scores_rows
 
 MICRO, NANO, MEGA = 1e-6, 1e-9, 1e6
 
 
+@table(
+    lambda study: (
+        f"""The forests studied ({study.model["path"]}): objective {study.model["objective"]},
+        Poisson’s ratio {study.model["poisson"]:g}. Held-out blocks were not used in training."""
+    ),
+    [
+        hidden("key", "Key"),
+        Column("quantity", "Quantity"),
+        Column("value", "Value"),
+        hidden("value_kind", "Its kind"),
+    ],
+)
 def model(study: ForestsStudy) -> Iterator[Row]:
     """Size and held-out scores of the forests studied."""
     return scores_rows(study.model)
 
 
+@table(
+    lambda results: (
+        f"""Every coarsening on {on_blocks(results)[0]["blocks"]:,} random blocks of each kind,
+        on one core; costs are medians. Errors: {MEASURE} Corner: forces on the corners only.
+        Databases beyond the range that they were made for take their stiffest material."""
+    ),
+    [
+        Column("blocks", "Blocks"),
+        Column("method", "Coarsening"),
+        Column("mean_error", "Nodal, mean", "small"),
+        Column("median_error", "median", "small"),
+        Column("mean_error_inertial", "Inertia, mean", "small"),
+        Column("median_error_inertial", "median", "small"),
+        Column("mean_error_corner", "Corner, mean", "small"),
+        Column("median_error_corner", "median", "small"),
+        Column("mean_squared_m2", "Nodal, absolute [m²]", "small", "m^2"),
+        Column("seconds_per_block", "Cost per block", "seconds"),
+        Column("seconds_per_block_min", "min", "seconds"),
+        Column("seconds_per_block_max", "max", "seconds"),
+        Column("storage_bytes", "Storage", "bytes"),
+        Column("training_seconds", "Made in", "seconds"),
+    ],
+    keys="blocks method",
+    conditions=MEASURED,
+)
 def every_block(results: Any) -> Iterator[Row]:
     """All that `forests table` found, row by row."""
     for row in on_blocks(results):
@@ -33,6 +69,16 @@ def every_block(results: Any) -> Iterator[Row]:
 def distributions(study: ForestsStudy, part: str) -> list[str]:
     """Names for people of the distributions that trainings are scored on."""
     return [name.replace("..", "…") for name in study.result(part)[0]["scores"]]
+
+
+def _scores(study: ForestsStudy, part: str) -> Iterator[Column]:
+    """Columns of the scores of trainings, by distribution."""
+    for number, name in enumerate(distributions(study, part)):
+        key = f"scores{number}"
+        yield Column(f"{key}_rms_log_solid", f"{name}: rms of log E, solid", "fraction")
+        yield Column(f"{key}_rms_log_partly_void", "rms of log E, partly void", "fraction")
+        yield Column(f"{key}_median_error", "median error of E", "percent")
+        yield Column(f"{key}_r2_log", "R² of log E", "score")
 
 
 def _trainings(study: ForestsStudy, part: str) -> Iterator[Row]:
@@ -48,17 +94,42 @@ def _measured(part: str, repeats: Any, **said: str) -> Any:
     return measured(lambda study: {"all": study.record(part)}, repeats, **said)
 
 
-VARIANTS = _measured("variants", ONE_COLD_RUN)
-
-
+@table(
+    """Ways to train, on the same rows and with the same storage, so little that all fill it;
+    “the same” refers to the training of the default forests. Scores are on fresh blocks that no
+    training has seen, by distribution of their moduli: rms of the error of log E over solid and
+    over partly void blocks, median relative error of a modulus E, and R² of log E; all against
+    the fit that is learned.""",
+    lambda study: [
+        Column("variant", "Training"),
+        Column("training_rows", "Rows trained on", "count"),
+        Column("leaves", "Leaves", "count"),
+        Column("storage_bytes", "Storage", "bytes"),
+        Column("training_seconds", "Training", "seconds"),
+        *_scores(study, "variants"),
+    ],
+    conditions=_measured("variants", ONE_COLD_RUN),
+)
 def variants(study: ForestsStudy) -> Iterator[Row]:
     """Ways to train."""
     return _trainings(study, "variants")
 
 
-CURVE = _measured("curve", ONE_COLD_RUN)
-
-
+@table(
+    """The same training on more and more rows, eight to a block. Scores are on fresh blocks
+    that no training has seen, by distribution of their moduli: rms of the error of log E over
+    solid and over partly void blocks, median relative error of a modulus E, and R² of log E;
+    all against the fit that is learned.""",
+    lambda study: [
+        Column("rows", "Rows", "count"),
+        hidden("training_rows", "Rows trained on", "count"),
+        Column("leaves", "Leaves", "count"),
+        Column("storage_bytes", "Storage", "bytes"),
+        Column("training_seconds", "Training", "seconds"),
+        *_scores(study, "curve"),
+    ],
+    conditions=_measured("curve", ONE_COLD_RUN),
+)
 def curve(study: ForestsStudy) -> Iterator[Row]:
     """Learning curve."""
     return _trainings(study, "curve")
@@ -80,9 +151,25 @@ def _seconds(key: str, timing: Row) -> Row:
     return {f"{key}{end}": MICRO * timing[name] for end, name in ends.items()}
 
 
-COST = _measured("benchmark", _repeats, threads="as the row says")
+def _cost_caption(study: ForestsStudy) -> str:
+    benchmark = study.result("benchmark")
+    rival = show(benchmark["rival"]["ratio"], "times")
+    caches = ", ".join(f"{name} {size}" for name, size in benchmark["caches"].items())
+    return f"""Wall time of a block by the forests studied, {benchmark["blocks"]:,} random blocks at
+    once, {runs(study)} warm runs; loading the forests takes
+    {show(benchmark["load_ms"] / 1e3, "seconds")}. On the trees of the last two rows scikit-learn
+    takes {rival} the time of coarsen, both on one core. {benchmark["processor"]}, caches
+    {caches}."""
 
 
+@table(
+    _cost_caption,
+    [
+        Column("evaluation", "Evaluation"),
+        *spread("seconds", "Median", "seconds"),
+    ],
+    conditions=_measured("benchmark", _repeats, threads="as the row says"),
+)
 def cost(study: ForestsStudy) -> Iterator[Row]:
     """Time of a block by each evaluation, and by scikit-learn's."""
     benchmark = study.result("benchmark")
@@ -96,9 +183,21 @@ def cost(study: ForestsStudy) -> Iterator[Row]:
         yield {"evaluation": name, **_seconds("seconds", timing)}
 
 
-SIZES = _measured("benchmark", _repeats, threads="1")
-
-
+@table(
+    """Wall time of a block on one core by forests of complete trees, for random blocks and for
+    those of a mesh, whose neighbours are alike; a walk is that of one origin down one tree.""",
+    [
+        Column("bytes", "Storage", "bytes"),
+        Column("trees", "Trees of each forest", "count"),
+        Column("depth", "Depth", "count"),
+        *spread("random", "Random blocks", "seconds", shown=False),
+        Column("random_walk", "a walk", "seconds"),
+        *spread("coherent", "Blocks of a mesh", "seconds", shown=False),
+        Column("coherent_walk", "a walk", "seconds"),
+    ],
+    keys="trees depth",
+    conditions=_measured("benchmark", _repeats, threads="1"),
+)
 def sizes(study: ForestsStudy) -> Iterator[Row]:
     """Time of a block over the size of forests."""
     for size in study.result("benchmark")["sizes"]:

@@ -84,7 +84,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(finished):
     page = Page(study / "report.html")
     assert_self_contained(page)
     assert {f"plot-{name}" for name in FIGURES} <= set(page.ids)
-    for name in FORESTS.entries:
+    for name in FORESTS.tables:
         assert_same_numbers(page, study / "tables", name)
     for name in FIGURES:
         assert (study / "figures" / f"{name}.png").stat().st_size > 5000

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from solver.coarsening.forest import FOREST
 from studies.base.cases import Case
-from studies.base.entry import Row
 from studies.base.results import spelt
-from studies.objectives.results import Objectives
-from studies.objectives.tables import FIRST as FIRST
+from studies.base.table import Column, Row, hidden, table
+from studies.objectives.results import FIRST, Objectives
 
 NBSP = "\N{NO-BREAK SPACE}"
 LABELS = {
@@ -102,6 +101,29 @@ def rms_limits(study: Objectives, solid: str) -> list[float]:
     return [goal.limit for goal in goals if goal.quantity == "rms" and goal.model in (None, solid)]
 
 
+def _columns(index: int, goal: Goal) -> tuple[Column, ...]:
+    """The largest value of a goal, the verdict, and where that value is."""
+    key = f"goal{index}"
+    where = Column if goal.model is None else hidden
+    return (
+        Column(f"{key}_value", goal.sentence, "percent"),
+        Column(key, "verdict"),
+        where(f"{key}_where", "worst at"),
+    )
+
+
+@table(
+    lambda study: (
+        f"""Goals on modes {FIRST}–{study.last("audible")}: the largest value among the cases
+        that a goal is about, and whether all of them keep the limit. A goal of the forests says
+        nothing of the fits."""
+    ),
+    lambda study: [
+        Column("coarsening", "Objective"),
+        Column("met", "Goals met"),
+        *(column for index, goal in enumerate(goals_of(study)) for column in _columns(index, goal)),
+    ],
+)
 def goals(study: Objectives) -> Iterator[Row]:
     """Goals met and missed by every objective."""
     for coarsening in study.coarsenings:
@@ -119,6 +141,22 @@ def goals(study: Objectives) -> Iterator[Row]:
         yield row
 
 
+@table(
+    """Every case that a goal is about: the limit, and the value of each objective.""",
+    lambda study: [
+        Column("goal", "Goal"),
+        hidden("model", "Model"),
+        Column("title", "Solid"),
+        Column("resolution", "Resolution", "count"),
+        Column("material", "Material"),
+        Column("limit", "Limit", "percent"),
+        *(
+            column
+            for name in study.coarsenings
+            for column in (Column(f"{name}", f"{name}", "percent"),)
+        ),
+    ],
+)
 def goal_cases(study: Objectives) -> Iterator[Row]:
     """Every case of every goal."""
     for goal in goals_of(study):

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from carillon.fem.model import RIGID_MODES
 from solver.coarsening.forest import FOREST
 from studies.base.cases import Case, CaseResults
+
+FIRST = RIGID_MODES + 1
 
 
 class Objectives(CaseResults):

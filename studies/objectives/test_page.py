@@ -14,7 +14,7 @@ from studies.base.table import read_table
 from studies.objectives.goals import goals_of, judge
 from studies.objectives.page import shortened
 from studies.objectives.results import Objectives
-from studies.objectives.study import OBJECTIVES as STUDY
+from studies.objectives.study import OBJECTIVES as DESCRIBED
 from studies.objectives.study import arguments
 from studies.objectives.tables import description
 from tests.pages import Page, assert_same_numbers, assert_self_contained
@@ -24,7 +24,7 @@ from workflow import settings, solids
 from workflow.configuration.whole import completed
 
 summary, errors, forest, goals, goal_cases = (
-    STUDY.entries[name] for name in ("summary", "errors", "forest", "goals", "goal-cases")
+    DESCRIBED.entries[name] for name in ("summary", "errors", "forest", "goals", "goal-cases")
 )
 STUDY = {
     "models": {
@@ -209,7 +209,7 @@ def test_the_page_of_a_miniature_study_holds_its_tables(finished):
     assert_self_contained(page)
     assert {"model-box", "plot-box"} <= set(page.ids)
     sizes = ("title", "unknowns", "coarse_unknowns")
-    for name in STUDY.entries:
+    for name in DESCRIBED.tables:
         hidden = sizes if name == "errors" else ("title",) if name == "goal-cases" else ()
         assert_same_numbers(page, finished / "tables", name, hidden)
     assert (finished / "figures" / "box.png").stat().st_size > 5000

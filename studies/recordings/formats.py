@@ -16,13 +16,11 @@ from scipy.signal import resample_poly
 
 from carillon.files.atomic import atomic_path
 from sound.clips.wav import read_wav
-from studies.base.entry import Row
+from studies.base.table import Row
 from studies.recordings.measurement import MODES, extract
 
 Array = NDArray[np.float64]
 
-FORMATS = "formats.json"
-"""Rows of the comparison."""
 RECORDING = "agogo-high"
 """That which is written in other formats."""
 HIGHEST_HERTZ = 8000.0

@@ -14,6 +14,10 @@ FOLDER = "recordings"
 """Folder of the study below that of a run."""
 PACKAGES = "packages"
 """Folder of the unpacked packages below that of the study."""
+EXTRACTED = "extracted"
+"""Folder of the files of a recording below its own."""
+START, FORMATS = "start.json", "formats.json"
+"""What the start of the program takes, and a recording in other formats, below the study's."""
 CALIBRATION, HELD_BACK = SPLITS = ("calibration", "held back")
 """What a recording may be used for."""
 

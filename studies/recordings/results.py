@@ -13,18 +13,20 @@ from numpy.typing import NDArray
 
 from sound.clips.wav import read_wav
 from studies.base.conditions import Record
-from studies.base.entry import Row
 from studies.base.results import Results
+from studies.base.table import Row
 from studies.recordings.measurement import MODES, RESIDUAL, RUN
 from studies.recordings.peaks import LOWEST_HERTZ, Peaks, strong_peaks
-from studies.recordings.recordings import PACKAGES, RecordedStrike, recordings
+from studies.recordings.recordings import (
+    EXTRACTED,
+    PACKAGES,
+    START,
+    RecordedStrike,
+    recordings,
+)
 
 Array = NDArray[np.float64]
 
-EXTRACTED = "extracted"
-"""Folder of the files of a recording below its own."""
-START = "start.json"
-"""What the start of the program takes, below the folder of the study."""
 _LEAST = 1e-20
 """Share of the energy below which nothing is left."""
 

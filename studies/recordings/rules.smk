@@ -1,24 +1,18 @@
-# How much of real recordings extraction finds: `snakemake recordings`, no part of the default run.
+# How much of real recordings extraction finds: `snakemake recordings`.
 from studies.recordings import study as recordings_study
 from studies.recordings import formats as recording_formats
 from studies.recordings import recordings as recording_list
-from studies.recordings import results as recording_results
 from studies.recordings.recordings import PACKAGES
 
 RECORDINGS_FOLDER = recording_list.FOLDER
 RECORDINGS = f"{RESULTS}/{RECORDINGS_FOLDER}"
 REAL = recording_list.recordings()
-EXTRACTED = recording_results.EXTRACTED
-EXTRACTION_START = f"{RECORDINGS}/{recording_results.START}"
+EXTRACTED = recording_list.EXTRACTED
+EXTRACTION_START = f"{RECORDINGS}/{recording_list.START}"
 
 
 wildcard_constraints:
     recording="|".join(REAL),
-
-
-rule recordings:
-    input:
-        f"{RECORDINGS}/index.html",
 
 
 # The one rule that needs a network, which nodes of a cluster may not have. The packages themselves are
@@ -33,7 +27,7 @@ rule bring_recordings:
         source=source("studies.recordings.command"),
         folder=lambda wildcards, output: Path(output[0]).with_name(PACKAGES),
     shell:
-        "python -m workflow recordings --out {params.folder:q} > {output:q}.partial 2> {log:q}"
+        "python -m carillon study recordings --out {params.folder:q} > {output:q}.partial 2> {log:q}"
         " && mv {output:q}.partial {output:q}"
 
 
@@ -71,7 +65,7 @@ rule compare_formats:
     input:
         extracted=f"{RECORDINGS}/{recording_formats.RECORDING}/{EXTRACTED}",
     output:
-        f"{RECORDINGS}/{recording_formats.FORMATS}",
+        f"{RECORDINGS}/{recording_list.FORMATS}",
     log:
         f"{LOGS}/{RECORDINGS_FOLDER}/formats.log",
     resources:
@@ -88,36 +82,13 @@ rule build_recording_page:
         config=f"{RESULTS}/config.yaml",
         extracted=f"{RECORDINGS}/{{recording}}/{EXTRACTED}",
         start=EXTRACTION_START,
-        templates=templates(recordings_study.RECORDINGS, "page.html.j2", "tables.yaml"),
     output:
         f"{RECORDINGS}/{{recording}}/page.html",
-        provenance=f"{RECORDINGS}/{{recording}}/tables/provenance.json",
+        tables_in(recordings_study.RECORDING, "provenance"),
     log:
         f"{LOGS}/{RECORDINGS_FOLDER}/{{recording}}/page.log",
     localrule: True
     params:
-        source=made_with_tables(recordings_study.RECORDING),
-        study=described(recordings_study.RECORDING, "tables", "page"),
-    script:
-        "../base/scripts/page.py"
-
-
-rule build_recordings_index:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        extracted=expand(f"{RECORDINGS}/{{recording}}/{EXTRACTED}", recording=REAL),
-        start=EXTRACTION_START,
-        formats=f"{RECORDINGS}/{recording_formats.FORMATS}",
-        pages=expand(f"{RECORDINGS}/{{recording}}/page.html", recording=REAL),
-        templates=templates(recordings_study.RECORDINGS, "index.html.j2", "index.yaml"),
-    output:
-        f"{RECORDINGS}/index.html",
-        tables=[f"{RECORDINGS}/tables/{name}.json" for name in recordings_study.RECORDINGS.entries],
-    log:
-        f"{LOGS}/{RECORDINGS_FOLDER}/index.log",
-    localrule: True
-    params:
-        source=made_with_tables(recordings_study.RECORDINGS),
-        study=described(recordings_study.RECORDINGS, "tables", "page"),
+        **made_with_tables(recordings_study.RECORDING),
     script:
         "../base/scripts/page.py"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from studies.base.study import Study
+from studies.base.study import Config, Study
+from studies.recordings.recordings import EXTRACTED, FORMATS, START, recordings
 
 RECORDING = Study(
     name="recording",
@@ -10,14 +11,23 @@ RECORDING = Study(
     folder="recordings",
     title="Extraction on a real recording",
     results="results:RecordingResults",
-    page="page:page",
+    tables=("modes", "missed", "provenance"),
+    file="{recording}/page.html",
 )
+
+
+def _pages(config: Config) -> list[str]:
+    return [f"{name}/page.html" for name in recordings()]
+
+
 RECORDINGS = Study(
     name="recordings",
-    package="studies.recordings",
-    folder="recordings",
     title="Extraction on real recordings",
     results="index:Recordings",
+    tables=("clips", "groups", "formats"),
+    tabulated="index",
     page="index:page",
-    tables="index.yaml",
+    file="index.html",
+    measured=lambda config: [START, FORMATS, *(f"{name}/{EXTRACTED}" for name in recordings())],
+    beside=_pages,
 )

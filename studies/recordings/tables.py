@@ -6,10 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.base.entry import Row
+from studies.base.table import Column, Row, table
 from studies.recordings.results import RecordingResults
 
 
+@table(
+    """Modes that were found. Levels are those of the amplitudes at the strike, below the
+    largest; the deviation is what the noise of the clip lets the frequency be uncertain by.""",
+    [
+        Column("mode", "Mode", "count"),
+        Column("frequency", "Frequency [Hz]", "hertz"),
+        Column("deviation", "Standard deviation [Hz]", "small", "Hz"),
+        Column("damping", "Damping [1/s]", "fraction", "1/s"),
+        Column("level", "Level [dB]", "fraction", "dB"),
+    ],
+)
 def modes(results: RecordingResults) -> Iterator[Row]:
     """The modes that were found, their levels below the loudest one."""
     found = results.found
@@ -27,6 +38,13 @@ def modes(results: RecordingResults) -> Iterator[Row]:
         }
 
 
+@table(
+    """Strong peaks of the clip's spectrum that no mode accounts for.""",
+    [
+        Column("frequency", "Frequency [Hz]", "hertz"),
+        Column("level", "Level [dB]", "fraction", "dB"),
+    ],
+)
 def missed(results: RecordingResults) -> Iterator[Row]:
     """Strong peaks that no mode accounts for."""
     peaks = results.peaks

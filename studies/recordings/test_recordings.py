@@ -17,23 +17,25 @@ import yaml
 from carillon.errors import UserError
 from sound.clips.wav import write_wav
 from sound.synthesis.sinusoids import damped_sinusoids
-from studies.base.table import Table, write_table
-from studies.recordings import index, page
-from studies.recordings.formats import FORMATS, Format, differences, formats, write_as
+from studies.base.table import Table
+from studies.recordings import index
+from studies.recordings.formats import Format, differences, formats, write_as
 from studies.recordings.measurement import MODES, RESIDUAL, RUN, extract, measure
 from studies.recordings.packages import CONTROL, SOUNDS, bring
 from studies.recordings.peaks import strong_peaks
 from studies.recordings.recordings import (
     CALIBRATION,
     FOLDER,
+    FORMATS,
     HELD_BACK,
     PACKAGES,
     SPLITS,
+    START,
     recordings,
 )
-from studies.recordings.results import START, RecordingResults
+from studies.recordings.results import RecordingResults
 from studies.recordings.study import RECORDING, RECORDINGS
-from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.pages import Page, assert_same_numbers, assert_self_contained, page_of
 from workflow.__main__ import main
 from workflow.commands.estimate import CONFIGURATIONS, load
 
@@ -201,17 +203,8 @@ def folder(tmp_path_factory) -> Path:
 
 
 def build(results: RecordingResults) -> tuple[Page, dict[str, Table]]:
-    made = {
-        name: make(results)
-        for name, make in RECORDING.entries.items()
-        if name not in results.absent
-    }
     place = results.folder / results.name
-    (place / "tables").mkdir(exist_ok=True)
-    for table in made.values():
-        write_table(table, place / "tables")
-    (place / "page.html").write_text(page.page(results, made), encoding="utf-8")
-    return Page(place / "page.html"), made
+    return page_of(RECORDING, results, place / "page.html"), RECORDING.made(results)
 
 
 def test_what_is_measured_of_a_clip_is_what_extract_says(folder):
@@ -271,16 +264,12 @@ def test_the_index_tells_every_recording_and_medians(folder, monkeypatch):
     more = {"median_cents": 0.01, "worst_cents": 0.2, "explained": 0.9}
     (folder / FORMATS).write_text(json.dumps([row | more]))
     results = index.Recordings(folder)
-    made = {name: make(results) for name, make in RECORDINGS.entries.items()}
-    (folder / "tables").mkdir()
-    for table in made.values():
-        write_table(table, folder / "tables")
-    (folder / "index.html").write_text(index.page(results, made), encoding="utf-8")
-    built = Page(folder / "index.html")
+    shown = page_of(RECORDINGS, results, folder / "index.html")
+    made = RECORDINGS.made(results)
     for name in made:
-        assert_same_numbers(built, folder / "tables", name)
-    assert {f"{name}/page.html" for name in chosen} <= set(built.led)
-    assert "<script" not in built.source
+        assert_same_numbers(shown, folder / "tables", name)
+    assert {f"{name}/page.html" for name in chosen} <= set(shown.led)
+    assert "<script" not in shown.source
     whole = made["groups"].rows[0]
     assert (whole["split"], whole["clips"], whole["refused"]) == ("all", 2, 1)
     assert whole["modes"] == len(FREQUENCIES) and whole["missed"] == 0
@@ -328,7 +317,7 @@ def test_the_study_is_planned_without_the_packages(plan):
     jobs = plan("recordings")
     assert jobs["extract_recording"] == jobs["build_recording_page"] == len(recordings())
     assert jobs["bring_recordings"] == jobs["time_extraction_start"] == 1
-    assert jobs["compare_formats"] == jobs["build_recordings_index"] == 1
+    assert jobs["compare_formats"] == jobs["build_recordings"] == 1
 
 
 def test_folders_of_packages_are_said_to_be_missing_in_one_sentence(tmp_path):

@@ -21,4 +21,4 @@ rule measure_scaling_of_run:
         model=lambda wildcards: model_arguments(wildcards, config["scaling"]["resolution"]),
         how=scaling.arguments(config["scaling"]),
     shell:
-        "python -m solver scaling {params.model:q} {params.how:q} --out {output:q} > {log:q} 2>&1"
+        "python -m carillon study scaling {params.model:q} {params.how:q} --out {output:q} > {log:q} 2>&1"

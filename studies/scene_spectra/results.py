@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 
 from solver.files.modes_file import ModesFile, read_modes
 from studies.base.results import Results
-from studies.scene_spectra.scene import BODIES, RENDERINGS, SOUND, TOLD, modes_file
+from studies.scene_spectra.scene import BODIES, FOLDER, RENDERINGS, SOUND, TOLD, modes_file
 
 Array = NDArray[np.float64]
-
-FOLDER = "scene_spectra"
-"""Folder of modes and renderings beside the run's configuration."""
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,14 @@
 # One scene of rigid bodies, heard by the truth's modes and by coarse ones (Fig. 13 of the paper):
-# `snakemake scene_spectra`, no part of the default run.
-from studies.scene_spectra import study as scene_spectra_study
+# `snakemake scene_spectra`.
 from studies.scene_spectra import scene as spectra_scene
 
-SPECTRA_FOLDER = "scene_spectra"
+SPECTRA_FOLDER = spectra_scene.FOLDER
 SPECTRA = f"{RESULTS}/{SPECTRA_FOLDER}"
 
 
 wildcard_constraints:
     heard="|".join(spectra_scene.RENDERINGS),
     body="|".join(spectra_scene.BODIES),
-
-
-rule scene_spectra:
-    input:
-        f"{RESULTS}/scene-spectra.html",
 
 
 # The forests are those of the package.
@@ -72,83 +66,3 @@ rule hear_scene:
     shell:
         "python -m studio scene {input.scene:q} --out {output.sound:q}"
         " --json > {output.told:q}.partial 2> {log:q} && mv {output.told:q}.partial {output.told:q}"
-
-
-rule tabulate_scene_spectra:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        found=expand(rules.hear_scene.output, heard=spectra_scene.RENDERINGS),
-        described=descriptions(
-            scene_spectra_study.SCENE_SPECTRA.package, scene_spectra_study.SCENE_SPECTRA.tables
-        ),
-    output:
-        expand(
-            f"{RESULTS}/tables/{{name}}.{{kind}}",
-            name=scene_spectra_study.SCENE_SPECTRA.entries,
-            kind=("csv", "md", "json"),
-        ),
-    log:
-        f"{LOGS}/{SPECTRA_FOLDER}/tables.log",
-    localrule: True
-    params:
-        source=source(
-            "studies.base.scripts.tabulate",
-            scene_spectra_study.SCENE_SPECTRA.module(scene_spectra_study.SCENE_SPECTRA.results),
-            *scene_spectra_study.SCENE_SPECTRA.table_modules,
-        ),
-        study=described(scene_spectra_study.SCENE_SPECTRA, "tables"),
-    script:
-        "../base/scripts/tabulate.py"
-
-
-for figure in scene_spectra_study.SCENE_SPECTRA.figures:
-
-    rule:
-        name:
-            f"plot_scene_{figure.name.replace('-', '_')}"
-        input:
-            config=f"{RESULTS}/config.yaml",
-            found=f"{RESULTS}/{figure.needs}",
-        output:
-            expand(
-                f"{RESULTS}/figures/{figure.file}.{{kind}}",
-                kind=("svg", "png"),
-                allow_missing=True,
-            ),
-        log:
-            f"{LOGS}/{SPECTRA_FOLDER}/{figure.file}.log",
-        localrule: True
-        params:
-            source=made_by(
-                "plot",
-                scene_spectra_study.SCENE_SPECTRA,
-                scene_spectra_study.SCENE_SPECTRA.results,
-                figure.draw,
-            ),
-            study=described(scene_spectra_study.SCENE_SPECTRA),
-            draw=figure.draw,
-        script:
-            "../base/scripts/plot.py"
-
-
-rule build_scene_spectra:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        tables=tables_in(scene_spectra_study.SCENE_SPECTRA),
-        figures=figures_of(scene_spectra_study.SCENE_SPECTRA),
-        templates=templates(scene_spectra_study.SCENE_SPECTRA),
-    output:
-        f"{RESULTS}/scene-spectra.html",
-    log:
-        f"{LOGS}/{SPECTRA_FOLDER}/page.log",
-    localrule: True
-    params:
-        source=made_by(
-            "page",
-            scene_spectra_study.SCENE_SPECTRA,
-            scene_spectra_study.SCENE_SPECTRA.results,
-            scene_spectra_study.SCENE_SPECTRA.page,
-        ),
-        study=described(scene_spectra_study.SCENE_SPECTRA, "page"),
-    script:
-        "../base/scripts/page.py"

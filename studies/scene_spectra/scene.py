@@ -12,6 +12,8 @@ from workflow.arguments import options
 from workflow.variants import TRUTH
 
 DESCRIBED: dict[str, Any] = read_own_yaml(Path(__file__).with_suffix(".yaml"))
+FOLDER = "scene_spectra"
+"""Folder of modes and renderings beside the run's configuration."""
 SCENE, SOUND, TOLD = "scene.yaml", "scene.wav", "scene.json"
 """Files of a rendering in its folder."""
 

@@ -8,13 +8,31 @@ import numpy as np
 
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ESTIMATE
-from studies.base.entry import Row
+from studies.base.table import Column, Row, hidden, table
 from studies.scene_spectra.results import SceneSpectra
 from studies.scene_spectra.scene import RENDERINGS
 from studies.sounds.spectral_distance import log_spectral_distance
 from workflow.variants import TRUTH
 
 
+@table(
+    """One scene of rigid bodies (Fig. 13), heard by modes of several models. Motion and
+    contacts are those of the fine mesh each time. Unknowns and wall time of the modes are those
+    of all bodies together. Distance is the rms difference of levels in third-octave bands over
+    time from the rendering by the truth's modes; the error is that of the elastic frequencies,
+    rms.""",
+    [
+        hidden("rendering", "Modes"),
+        Column("title", "Modes"),
+        Column("about", "What they are"),
+        Column("unknowns", "Unknowns", "count"),
+        Column("solve_seconds", "Modes found in", "seconds"),
+        Column("impacts", "Impacts", "count"),
+        Column("frequency_error", "Frequency error", "percent"),
+        Column("distance_decibels", "Distance [dB]", "fraction", "dB"),
+    ],
+    name="scene_spectra",
+)
 def scene_spectra(results: SceneSpectra) -> Iterator[Row]:
     """One row for every kind of modes: what they cost, and how far their sound is off."""
     truth = results.pressures[TRUTH]

@@ -11,12 +11,10 @@ import soundfile
 import yaml
 
 from sound.scenes.scene import scene_of
-from studies.base.style import save
-from studies.base.table import write_table
-from studies.scene_spectra import page, plots, scene
+from studies.scene_spectra import scene
 from studies.scene_spectra.results import FOLDER, SceneSpectra
 from studies.scene_spectra.study import SCENE_SPECTRA
-from tests.pages import Page, assert_same_numbers
+from tests.pages import assert_same_numbers, page_of
 from tests.scenes import require_engine
 from tests.workflow_runs import TINY, planned, snakemake
 from workflow.commands.estimate import CONFIGURATIONS, load
@@ -49,7 +47,11 @@ def test_the_target_makes_the_study_alone(tmp_path):
     bodies, heard = len(scene.BODIES), len(scene.RENDERINGS)
     assert jobs["find_modes_of_body"] == bodies * heard
     assert jobs["hear_scene"] == jobs["write_heard_scene"] == heard
-    once = ("tabulate_scene_spectra", "plot_scene_scene_spectrograms", "build_scene_spectra")
+    once = (
+        "tabulate_scene_spectra",
+        "plot_scene_spectra_scene_spectrograms",
+        "build_scene_spectra",
+    )
     assert all(jobs[rule] == 1 for rule in once)
     assert not {"find_modes", "train_forests", "play_scene"} & set(jobs)
 
@@ -104,14 +106,7 @@ def test_distances_are_of_pressures_whatever_the_scale_of_a_file(results):
 
 
 def test_the_page_plays_every_rendering_and_shows_the_numbers(results):
-    table = SCENE_SPECTRA.entries["scene_spectra"](results)
-    for name in ("tables", "figures"):
-        (results.folder / name).mkdir()
-    write_table(table, results.folder / "tables")
-    save(plots.spectrograms_figure(results), [results.figure("scene-spectrograms.svg")])
-    path = results.folder / "scene-spectra.html"
-    path.write_text(page.page(results, {"scene_spectra": table}), encoding="utf-8")
-    read = Page(path)
+    read = page_of(SCENE_SPECTRA, results, results.folder / "scene-spectra.html")
     assert_same_numbers(read, results.folder / "tables", "scene_spectra", ())
     played = [link for link in read.links if link.endswith(".wav")]
     assert played == [f"{FOLDER}/{name}/{scene.SOUND}" for name in scene.RENDERINGS]

@@ -1,6 +1,5 @@
 # Scenes of designs and bars that fall, roll and strike each other, each with sound, film and page:
-# `snakemake scenes`, no part of the default run.
-from studies.scenes import study as scenes_study
+# `snakemake scenes`.
 from studies.scenes import examples as scene_examples
 
 SCENES_FOLDER = scene_examples.FOLDER
@@ -11,11 +10,6 @@ OF_SCENE = {key: f"{SCENES}/{{scene}}/{name}" for key, name in scene_examples.OU
 
 wildcard_constraints:
     scene="|".join(PLAYED),
-
-
-rule scenes:
-    input:
-        f"{SCENES}/index.html",
 
 
 rule write_scene:
@@ -61,21 +55,3 @@ rule play_scene:
     shell:
         "python -m studio scene {params.scene:q} {params.outputs:q}"
         " --json > {output.told:q}.partial 2> {log:q} && mv {output.told:q}.partial {output.told:q}"
-
-
-rule build_scenes_page:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        told=expand(rules.play_scene.output.told, scene=PLAYED),
-        templates=templates(scenes_study.SCENES, "page.html.j2", "tables.yaml"),
-    output:
-        f"{SCENES}/index.html",
-        tables=[f"{SCENES}/tables/{name}.json" for name in scenes_study.SCENES.entries],
-    log:
-        f"{LOGS}/{SCENES_FOLDER}/index.log",
-    localrule: True
-    params:
-        source=made_with_tables(scenes_study.SCENES),
-        study=described(scenes_study.SCENES, "tables", "page"),
-    script:
-        "../base/scripts/page.py"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from studies.base.study import Study
+from studies.scenes.examples import TOLD, scenes
 
 SCENES = Study(
     name="scenes",
-    package="studies.scenes",
-    folder="scenes",
     title="Scenes of solids that sound",
     results="results:Scenes",
-    page="page:page",
+    tables=("scenes", "files", "impacts"),
+    file="index.html",
+    measured=lambda config: [f"{name}/{TOLD}" for name in scenes(config)],
 )

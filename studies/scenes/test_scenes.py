@@ -15,8 +15,7 @@ from sound.clips.wav import read_wav
 from sound.scenes.materials import MATERIALS, named_material
 from sound.scenes.playing.impact_list import COLUMNS
 from sound.scenes.scene import Scene, load_scene
-from studies.base.table import write_table
-from studies.scenes import page, tables
+from studies.scenes import tables
 from studies.scenes.config import ScenesSection
 from studies.scenes.examples import (
     BARS,
@@ -35,7 +34,7 @@ from studies.scenes.examples import (
 from studies.scenes.results import Scenes
 from studies.scenes.study import SCENES
 from studies.sounds import examples as sounds
-from tests.pages import Page, assert_same_numbers
+from tests.pages import Page, assert_same_numbers, page_of
 from tests.scenes import moved, require_engine
 from tests.workflow_runs import TINY, snakemake
 from workflow.commands.estimate import CONFIGURATIONS, load
@@ -168,7 +167,7 @@ def test_points_are_as_far_apart_as_asked():
 def test_all_scenes_are_planned_with_the_designs_that_they_need(plan):
     jobs = plan(FOLDER)
     assert jobs["play_scene"] == 3 and jobs["write_scene"] == 2
-    assert jobs["build_scenes_page"] == jobs["scenes"] == 1
+    assert jobs["build_scenes"] == jobs["scenes"] == 1
     chosen = [sounds.examples(CONFIG)[name] for name in CONFIG["sound"]["examples"]]
     assert jobs["design_sound"] == sum(example.edits for example in chosen)
     assert not {"build_sound_page", "find_reach", "find_modes"} & set(jobs)
@@ -176,7 +175,8 @@ def test_all_scenes_are_planned_with_the_designs_that_they_need(plan):
 
 def test_the_tiny_run_plays_bars_alone(plan):
     jobs = plan(FOLDER, "--configfile", TINY)
-    assert set(jobs) == {"play_scene", "save_config", "build_scenes_page", "scenes", "total"}
+    made = {"play_scene", "tabulate_scenes", "build_scenes"}
+    assert set(jobs) == {*made, "save_config", "scenes", "total"}
 
 
 # Their page --------------------------------------------------------------------------------------
@@ -215,22 +215,17 @@ def write_impacts(path: Path, impacts: list[tuple]) -> None:
 
 
 def test_tables_tell_what_happened_and_how_long_it_took(results):
-    first, second = tables.scenes(results)
+    first, second = tables.scenes(results).rows
     assert (first["impacts"], first["first"], first["hardest"]) == (2, 0.1, 2.5)
     assert (second["impacts"], second["first"], second["hardest"]) == (0, None, None)
     assert first["wall"] == 12.5 and second["wall"] == 7.75
-    assert next(tables.files(results))["out"] == 1000
-    assert [row["first"] for row in tables.impacts(results)] == ["bar", "ball"]
+    assert tables.files(results).rows[0]["out"] == 1000
+    assert [row["first"] for row in tables.impacts(results).rows] == ["bar", "ball"]
 
 
 def test_the_page_has_the_films_and_the_numbers_of_its_tables(results):
-    made = {name: make(results) for name, make in SCENES.entries.items()}
-    for table in made.values():
-        write_table(table, results.folder / "tables")
-    index = results.folder / "index.html"
-    index.write_text(page.page(results, made), encoding="utf-8")
-    read = Page(index)
-    for name in made:
+    read = page_of(SCENES, results, results.folder / "index.html")
+    for name in SCENES.tables:
         hidden = ("title",) if name == "impacts" else ()
         assert_same_numbers(read, results.folder / "tables", name, hidden)
     loaded = [link for link in read.links if not link.startswith(("data:", "#"))]

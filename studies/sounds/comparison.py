@@ -7,10 +7,11 @@ from functools import cached_property
 from typing import Any
 
 from studies.base.conditions import IN_COLUMNS, Record, Repeats, measured
-from studies.base.entry import Row
-from studies.base.page import rendered
+from studies.base.numbers import show
+from studies.base.page import StudyPage, section
+from studies.base.parts import grid, html
 from studies.base.results import Results
-from studies.base.table import Table
+from studies.base.table import Column, Row, Table, hidden, spread, table
 from studies.sounds.examples import COMPARISON, examples
 from studies.sounds.tables import METHODS
 
@@ -36,6 +37,29 @@ COMPARED = measured(
 )
 
 
+@table(
+    lambda results: (
+        f"""The hybrid optimiser beside its two parts alone on solids whose clips are strikes of
+        a known material, with checks on the fine solid, for
+        {show(results.config["sound"]["compare_seconds"], "count")} s each: medians, smallest
+        and largest values of {results.config["sound"]["compare_seeds"]} seeds. Costs and
+        distances are those of the fine solid. L-BFGS makes no use of its seed, so that its
+        spread is that of the clock."""
+    ),
+    [
+        hidden("example", "Example"),
+        Column("title", "Solid"),
+        Column("method", "Optimiser"),
+        Column("cost_start", "Cost before", "score"),
+        *spread("cost_end", "after", "score"),
+        *spread("fall", "Fall", "share"),
+        *spread("evaluations", "Evaluations", "count"),
+        *spread("fine_rms_cents", "From targets, rms [cents]", "fraction", "cents"),
+        *spread("seconds", "Time", "seconds", shown=False),
+    ],
+    keys="example method",
+    conditions=COMPARED,
+)
 def comparison(results: ComparedSounds) -> Iterator[Row]:
     """Medians and spreads of every optimiser on every solid."""
     for name, compared in results.compared.items():
@@ -47,10 +71,13 @@ def comparison(results: ComparedSounds) -> Iterator[Row]:
             yield {**row, **falls, "example": name, "title": title, "method": method}
 
 
-def page(results: ComparedSounds, tables: dict[str, Table]) -> str:
+def page(results: ComparedSounds, tables: dict[str, Table]) -> StudyPage:
     """Build the page from its table."""
-    return rendered(
-        "studies/sounds/comparison.html.j2",
+    return StudyPage(
         title="Optimisers by several seeds",
-        table=tables["comparison"],
+        kicker="sound design",
+        lede="Does the hybrid find better materials than its parts, or was it luck?",
+        sections=[section("optimisers", "Optimisers", grid(tables["comparison"]))],
+        footer=html("""This page holds all of its numbers; its table is also a file in
+            <span class="file">tables/</span> beside it."""),
     )

@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from studies.base.entry import Row
 from studies.base.media import wav_uri
-from studies.base.page import rendered
+from studies.base.page import Section, StudyPage, section
+from studies.base.parts import audio, div, facts, figure, grid, html, prose
 from studies.base.results import Results
-from studies.base.table import Table, read_table
+from studies.base.table import Column, Row, Table, hidden, read_table, table
 from studies.sounds.examples import OF_RECORDINGS, WITHOUT_RECORDINGS
 from studies.sounds.results import CLIPS, SoundResults
 
@@ -50,7 +50,27 @@ class OfRecordings(Examples):
     )
 
 
-def summary(index: Examples) -> Iterator[Row]:
+@table(
+    """Cost before and after the last edit of every example, how far frequencies are from their
+    targets on the coarse and on the fine solid (rms, each with the factor of its moduli that is
+    best), and the largest difference of a frequency.""",
+    [
+        hidden("example", "Example"),
+        Column("title", "Example"),
+        Column("points", "Struck points"),
+        Column("modes", "Modes", "count"),
+        Column("cost_before", "Cost before", "score"),
+        Column("cost", "after", "score"),
+        Column("fall", "Fall", "share"),
+        Column("coarse_cents", "Coarse, rms [cents]", "fraction", "cents"),
+        Column("fine_cents", "Fine, rms [cents]", "fraction", "cents"),
+        Column("fine_bark", "Fine, rms [bark]", "fraction", "bark"),
+        Column("worst", "Largest difference [bark]", "fraction", "bark"),
+        Column("seconds", "Time", "seconds"),
+        Column("per_minute", "Evaluations a minute", "count"),
+    ],
+)
+def sounds(index: Examples) -> Iterator[Row]:
     """One row for every example: its last edit."""
     for results in index.examples:
         rows = _rows(results, "frequencies")
@@ -67,6 +87,24 @@ def summary(index: Examples) -> Iterator[Row]:
         }
 
 
+@table(
+    """How far modes alone sound from the clips, the rms difference of their levels in bands, as
+    the page of each example describes it. Modes designed are those of the clip that were asked
+    for, as a perfect material sounds; all modes of the clip are what the extraction knows of
+    it.""",
+    [
+        hidden("example", "Example"),
+        Column("title", "Example"),
+        Column("point", "Struck point"),
+        Column("silence", "Silence [dB]", "fraction", "dB"),
+        Column("before", "Before [dB]", "fraction", "dB"),
+        Column("after", "After [dB]", "fraction", "dB"),
+        Column("fine", "After, fine model [dB]", "fraction", "dB"),
+        Column("wanted", "Modes designed [dB]", "fraction", "dB"),
+        Column("modes", "All modes of the clip [dB]", "fraction", "dB"),
+    ],
+    keys="example point",
+)
 def distances(index: Examples) -> Iterator[Row]:
     """How far every example sounds from its clips."""
     for results in index.examples:
@@ -79,26 +117,33 @@ def _rows(results: SoundResults, table: str) -> list[Row]:
     return read_table(results.file(f"tables/{table}.json")).rows
 
 
-def page(index: Examples, tables: dict[str, Table]) -> str:
+def page(index: Examples, tables: dict[str, Table]) -> StudyPage:
     """Build the page from its table and the sounds of all examples."""
-    return rendered(
-        "studies/sounds/index.html.j2",
+    return StudyPage(
         title=index.title,
-        about=index.about,
-        examples=[(results.example, _players(results)) for results in index.examples],
-        tables=tables,
+        kicker="examples",
+        lede=index.about,
+        sections=[
+            section("overview", "Overview", grid(tables["sounds"]), grid(tables["distances"])),
+            *map(_heard, index.examples),
+        ],
+        footer="""This page holds its sounds and numbers; its tables are also files in a folder
+            beside it.""",
     )
 
 
-def _players(results: SoundResults) -> dict[str, str]:
-    """By target: its clip and then the sound of the design, each as loud as it can be."""
-    players = {}
-    for target in results.example.targets:
-        parts = []
-        rate = 0
-        for state in (CLIPS, "after"):
-            sound, rate = results.sound(state, target.name)
-            part = sound[: round(PLAYED_SECONDS * rate)]
-            parts.append(part / max(float(np.abs(part).max()), 1e-30))
-        players[target.name] = wav_uri(np.concatenate(parts), rate, 1.0)
-    return players
+def _heard(results: SoundResults) -> Section:
+    """An example: every clip and then the sound of the design, each as loud as it can be."""
+    example = results.example
+    led = '<a href="{}/page.html">Spectrograms, material, modes and files</a>'
+    panels = []
+    for target in example.targets:
+        sounds = [results.sound(state, target.name) for state in (CLIPS, "after")]
+        played = [sound[: round(PLAYED_SECONDS * rate)] for sound, rate in sounds]
+        loud = [part / max(float(np.abs(part).max()), 1e-30) for part in played]
+        source = wav_uri(np.concatenate(loud), sounds[-1][1], 1.0)
+        name = html('<span class="name">{}</span>', target.name.capitalize())
+        told = facts(name, "target, then the sound that was found")
+        panels.append(figure(told, audio(source, f"{example.title}, {target.name}")))
+    about = prose(f"{example.about} ({example.figure})", html(led, example.name))
+    return section(example.name, example.title, about, div("panels", *panels))

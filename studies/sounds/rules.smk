@@ -6,17 +6,6 @@ from studies.sounds import study as sounds_study
 include: "examples.smk"
 
 
-rule sounds:
-    input:
-        f"{SOUND}/index.html",
-
-
-# The same from real recordings, which a network brings: no part of `sounds`.
-rule sounds_of_recordings:
-    input:
-        f"{SOUND}/recordings.html",
-
-
 rule synthesise_clip:
     output:
         f"{SOUND}/{{example}}/clips/{{point}}.wav",
@@ -171,7 +160,7 @@ rule compare_optimisers:
         source=source("studies.design.command"),
         how=options({"seconds": config["sound"]["compare_seconds"]}),
     shell:
-        "python -m sound benchmark {input.project:q} {params.how:q}"
+        "python -m carillon study benchmark-design {input.project:q} {params.how:q}"
         " --json > {output:q}.partial 2> {log:q} && mv {output:q}.partial {output:q}"
 
 
@@ -195,24 +184,6 @@ use rule compare_optimisers as compare_optimisers_by_seeds with:
             }
         )
         + ["--fine-check"],
-
-
-rule compared_sounds:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        found=[f"{SOUND}/{name}/{COMPARISON}" for name in RECORDED],
-        templates=templates(sounds_study.SOUNDS, "comparison.html.j2", "comparison.yaml"),
-    output:
-        f"{SOUND}/comparison.html",
-        table=f"{SOUND}/tables/comparison.json",
-    log:
-        f"{LOGS}/{SOUND_FOLDER}/comparison.log",
-    localrule: True
-    params:
-        source=made_with_tables(sounds_study.COMPARED_SOUNDS),
-        study=described(sounds_study.COMPARED_SOUNDS, "tables", "page"),
-    script:
-        "../base/scripts/page.py"
 
 
 rule find_reach:
@@ -327,56 +298,13 @@ rule build_sound_page:
         sounds=all_sounds,
         optimisers=comparison,
         reached=f"{SOUND}/{{example}}/{REACHED}",
-        templates=templates(sounds_study.SOUNDS, "page.html.j2", "tables.yaml"),
     output:
         f"{SOUND}/{{example}}/page.html",
-        found=[
-            f"{SOUND}/{{example}}/tables/{name}.json"
-            for name in ("designs", "frequencies", "nearness", "distances")
-        ],
+        tables_in(sounds_study.SOUND, *sounds_study.READ),
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{example}}/page.log",
     localrule: True
     params:
-        source=made_with_tables(sounds_study.SOUND),
-        study=described(sounds_study.SOUND, "tables", "page"),
+        **made_with_tables(sounds_study.SOUND),
     script:
         "../base/scripts/page.py"
-
-
-rule build_sounds_index:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        pages=expand(f"{SOUND}/{{example}}/page.html", example=WITHOUT_RECORDINGS),
-        found=expand(rules.build_sound_page.output.found, example=WITHOUT_RECORDINGS),
-        templates=templates(sounds_study.SOUNDS, "index.html.j2", "index.yaml"),
-    output:
-        f"{SOUND}/index.html",
-        tables=[f"{SOUND}/tables/{name}.json" for name in sounds_study.SOUNDS.entries],
-    log:
-        f"{LOGS}/{SOUND_FOLDER}/index.log",
-    localrule: True
-    params:
-        source=made_with_tables(sounds_study.SOUNDS),
-        study=described(sounds_study.SOUNDS, "tables", "page"),
-    script:
-        "../base/scripts/page.py"
-
-
-use rule build_sounds_index as build_sounds_of_recordings_index with:
-    input:
-        config=f"{RESULTS}/config.yaml",
-        pages=expand(f"{SOUND}/{{example}}/page.html", example=OF_RECORDINGS),
-        found=expand(rules.build_sound_page.output.found, example=OF_RECORDINGS),
-        templates=templates(sounds_study.SOUNDS, "index.html.j2", "index.yaml"),
-    output:
-        f"{SOUND}/recordings.html",
-        tables=[
-            f"{SOUND}/tables/{sound_examples.OF_RECORDINGS}-{name}.json"
-            for name in sounds_study.SOUNDS_OF_RECORDINGS.entries
-        ],
-    log:
-        f"{LOGS}/{SOUND_FOLDER}/recordings.log",
-    params:
-        source=made_with_tables(sounds_study.SOUNDS_OF_RECORDINGS),
-        study=described(sounds_study.SOUNDS_OF_RECORDINGS, "tables", "page"),

@@ -2,40 +2,74 @@
 
 from __future__ import annotations
 
-from studies.base.study import Study
+from collections.abc import Callable
 
+from studies.base.study import Config, Study
+from studies.sounds.examples import (
+    COMPARISON,
+    FOLDER,
+    OF_RECORDINGS,
+    WITHOUT_RECORDINGS,
+    examples,
+)
+
+READ = ("designs", "frequencies", "nearness", "distances")
+"""Tables of an example that the page of all of them is made from."""
 SOUND = Study(
     name="sound",
     package="studies.sounds",
-    folder="sound",
+    folder=FOLDER,
     title="An example of sound design",
     results="results:SoundResults",
-    page="page:page",
+    tables=(
+        *("designs", "frequencies", "truth", "nearness", "distances", "checks", "reach"),
+        *("amplitudes", "optimisers", "evaluation", "provenance"),
+    ),
+    file="{example}/page.html",
 )
+
+
+def _made(listed: str) -> Callable[[Config], list[str]]:
+    """Tables and pages of the examples of a list of the configuration."""
+    made = [*(f"tables/{name}.json" for name in READ), "page.html"]
+    return lambda config: [f"{name}/{file}" for name in config["sound"][listed] for file in made]
+
+
 SOUNDS = Study(
     name="sounds",
-    package="studies.sounds",
-    folder="sound",
+    folder=FOLDER,
     title="All examples of sound design",
     results="index:Examples",
+    tables=("sounds", "distances"),
+    tabulated="index",
     page="index:page",
-    tables="index.yaml",
-)
-COMPARED_SOUNDS = Study(
-    name="compared_sounds",
-    package="studies.sounds",
-    folder="sound",
-    title="Optimisers of sound designs",
-    results="comparison:ComparedSounds",
-    page="comparison:page",
-    tables="comparison.yaml",
+    file="index.html",
+    measured=_made(WITHOUT_RECORDINGS),
 )
 SOUNDS_OF_RECORDINGS = Study(
     name="sounds_of_recordings",
     package="studies.sounds",
-    folder="sound",
+    folder=FOLDER,
     title="Sound design from real recordings",
     results="index:OfRecordings",
+    tables=("sounds", "distances"),
+    tabulated="index",
+    prefix=f"{OF_RECORDINGS}-",
     page="index:page",
-    tables="index.yaml",
+    file=f"{OF_RECORDINGS}.html",
+    measured=_made(OF_RECORDINGS),
+)
+COMPARED_SOUNDS = Study(
+    name="compared_sounds",
+    package="studies.sounds",
+    folder=FOLDER,
+    title="Optimisers of sound designs",
+    results="comparison:ComparedSounds",
+    tables=("comparison",),
+    tabulated="comparison",
+    page="comparison:page",
+    file="comparison.html",
+    measured=lambda config: [
+        f"{name}/{COMPARISON}" for name, each in examples(config).items() if each.recorded
+    ],
 )

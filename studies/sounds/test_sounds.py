@@ -22,7 +22,6 @@ from sound.project.project import load_project
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
-from studies.base.table import write_table
 from studies.recordings.recordings import recordings
 from studies.sounds import comparison, config, index, page, tables
 from studies.sounds.examples import (
@@ -45,7 +44,7 @@ from studies.sounds.pictures import fine_mesh
 from studies.sounds.plots import _ticks
 from studies.sounds.results import MODES, SoundResults
 from studies.sounds.study import COMPARED_SOUNDS, SOUND, SOUNDS
-from tests.pages import Page, assert_same_numbers, assert_self_contained
+from tests.pages import Page, assert_same_numbers, assert_self_contained, page_of
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.workflow_runs import TINY, snakemake
 from workflow.commands.estimate import CONFIGURATIONS, load
@@ -185,12 +184,7 @@ def write_sounds(folder: Path, design: Design) -> None:
 
 @pytest.fixture(scope="module")
 def built(results: SoundResults) -> Page:
-    made = {name: make(results) for name, make in SOUND.entries.items()}
-    for table in made.values():
-        write_table(table, results.file("tables"))
-    html = page.page(results, made)
-    results.file("page.html").write_text(html, encoding="utf-8")
-    return Page(results.file("page.html"))
+    return page_of(SOUND, results, results.file("page.html"))
 
 
 def test_the_page_needs_nothing_from_elsewhere_and_can_be_heard(results, built):
@@ -229,7 +223,7 @@ def test_tables_of_the_page_are_those_of_the_files(results, built, name):
 
 
 def test_every_edit_counts_its_own_time(results, built):
-    rows = list(tables.designs(results))
+    rows = tables.designs(results).rows
     assert [row["cost_before"] for row in rows] == [9.0, 6.0]
     assert [row["cost"] for row in rows] == [4.0, 0.5]
     assert rows[1]["seconds"] == pytest.approx(2.0) and rows[1]["evaluations"] == 20
@@ -237,7 +231,7 @@ def test_every_edit_counts_its_own_time(results, built):
 
 
 def test_the_fine_model_is_set_beside_the_coarse_one(results):
-    rows = list(tables.truth(results))
+    rows = tables.truth(results).rows
     assert len(rows) == N_MODES
     for row in rows:
         assert row["error"] == pytest.approx(row["found"] / row["truth"] - 1.0)
@@ -250,12 +244,10 @@ def test_the_page_says_which_modes_the_solid_can_have_where_the_search_fell_shor
     enough = Box(results.folder, results.name)
     enough.__dict__["reached"] = reached()
     assert "reach" in enough.absent
-    made = {name: make(enough) for name, make in SOUND.entries.items() if name != "reach"}
-    assert "What the solid can have" not in page.page(enough, made)
+    assert "What the solid can have" not in SOUND.build(enough)
 
 
 def test_optimisers_are_set_beside_each_other_on_the_recorded_solids(tmp_path):
-    (tmp_path / "tables").mkdir()
     (tmp_path / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     found = compared()
     for row in found["rows"]:
@@ -265,11 +257,9 @@ def test_optimisers_are_set_beside_each_other_on_the_recorded_solids(tmp_path):
     results = comparison.ComparedSounds(tmp_path / FOLDER)
     results.__dict__["config"] = CONFIG
     results.__dict__["compared"] = dict.fromkeys(("recorded-bar", "recorded-bell"), found)
-    table = COMPARED_SOUNDS.entries["comparison"](results)
-    write_table(table, tmp_path / "tables")
-    assert len(table.rows) == 6 and table.rows[0]["fall_max"] == pytest.approx(1.0 - 0.5 / 9.0)
-    (tmp_path / "page.html").write_text(comparison.page(results, {"comparison": table}), "utf-8")
-    read = Page(tmp_path / "page.html")
+    read = page_of(COMPARED_SOUNDS, results, tmp_path / "page.html")
+    rows = COMPARED_SOUNDS.made(results)["comparison"].rows
+    assert len(rows) == 6 and rows[0]["fall_max"] == pytest.approx(1.0 - 0.5 / 9.0)
     assert_self_contained(read)
     assert_same_numbers(read, tmp_path / "tables", "comparison")
 
@@ -281,7 +271,7 @@ def test_the_comparison_is_planned_for_recorded_solids_alone(plan):
 
 
 def test_a_common_factor_does_not_count_as_distance_of_frequencies(results):
-    rows = {row["solid"]: row for row in tables.nearness(results)}
+    rows = {row["solid"]: row for row in tables.nearness(results).rows}
     design = results.design
     apart = np.log2(design.coarse_frequencies / design.targets.frequencies)
     expected = 1200.0 * np.std(apart)
@@ -299,24 +289,18 @@ def test_what_is_compared_begins_where_the_modes_of_the_clip_do(results):
 
 
 def test_silence_is_farther_from_a_clip_than_what_is_known_of_it(results):
-    for row in tables.distances(results):
+    for row in tables.distances(results).rows:
         assert row["modes"] < row["silence"]
 
 
 @pytest.mark.parametrize("listed", [index.Examples, index.OfRecordings])
 def test_the_index_leads_to_the_page(results, built, tmp_path, listed):
-    (tmp_path / "tables").mkdir()
     examples = SimpleNamespace(
         examples=[results], title=listed.title, about=listed.about, prefix=listed.prefix
     )
-    made = {name: make(examples) for name, make in SOUNDS.entries.items()}
-    for table in made.values():
-        write_table(table, tmp_path / "tables")
-    html = index.page(examples, made)
-    (tmp_path / "index.html").write_text(html, encoding="utf-8")
-    read = Page(tmp_path / "index.html")
+    read = page_of(SOUNDS, examples, tmp_path / "index.html")
     assert_self_contained(read)
-    for name in made:
+    for name in SOUNDS.tables:
         assert_same_numbers(read, tmp_path / "tables", f"{listed.prefix}{name}")
     assert "box/page.html" in read.led
     assert read.source.count("data:audio/wav;base64,") == 2
@@ -385,15 +369,15 @@ def test_all_examples_are_planned_without_any_mesh_file(plan):
     assert jobs["begin_design"] == jobs["check_design"] == jobs["build_sound_page"] == 7
     assert jobs["record_clip"] == 8 and jobs["synthesise_clip"] == 9
     assert jobs["find_reach"] == 7 and "compare_optimisers_by_seeds" not in jobs
-    assert jobs["build_sounds_index"] == 1 and jobs["compare_optimisers"] == 2
+    assert jobs["build_sounds"] == 1 and jobs["compare_optimisers"] == 2
 
 
 def test_examples_of_recordings_are_planned_and_need_no_other(plan):
     jobs = plan("sounds_of_recordings")
     count = len(CONFIG["sound"]["recordings"])
     assert jobs["take_recording"] == jobs["design_sound"] == jobs["build_sound_page"] == count
-    assert jobs["bring_recordings"] == jobs["build_sounds_of_recordings_index"] == 1
-    assert "synthesise_clip" not in jobs and "build_sounds_index" not in jobs
+    assert jobs["bring_recordings"] == jobs["build_sounds_of_recordings"] == 1
+    assert "synthesise_clip" not in jobs and "build_sounds" not in jobs
 
 
 @pytest.mark.nightly

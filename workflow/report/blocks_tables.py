@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from studies.base.conditions import IN_COLUMNS, Repeats, measured
-from studies.base.entry import Row
+from studies.base.table import Column, Row, hidden, table
 
 LOWER_BOUND = "least of any element"
 ERRORS = {
@@ -63,6 +63,39 @@ def method_of(row: Row) -> str:
     return name.removesuffix(f" {low:g}..{high:g} GPa")
 
 
+def _errors(number: int, kind: str) -> tuple[Column, ...]:
+    """Columns of the errors on a kind of blocks."""
+    key = f"kind{number}"
+    return (
+        Column(f"{key}_nodal", f"{kind}: nodal", "fraction"),
+        hidden(f"{key}_nodal_median", f"{kind}: nodal, median", "fraction"),
+        Column(f"{key}_inertial", "inertia", "fraction"),
+        hidden(f"{key}_inertial_median", f"{kind}: inertia, median", "fraction"),
+    )
+
+
+@table(
+    lambda results: (
+        f"""Relative squared displacement error on {on_blocks(results)[0]["blocks"]:,} random
+        blocks of each kind, mean over the blocks: {MEASURE} Medians are in the CSV file. A
+        database is made for each kind, its storage and time are those of one; cost on one core,
+        median."""
+    ),
+    lambda results: [
+        Column("method", "Coarsening"),
+        *(
+            column
+            for each in enumerate(kinds_of(compared(on_blocks(results))))
+            for column in _errors(*each)
+        ),
+        Column("seconds_per_block", "Cost per block", "seconds"),
+        Column("seconds_per_block_min", "min", "seconds"),
+        Column("seconds_per_block_max", "max", "seconds"),
+        Column("storage_bytes", "Storage", "bytes"),
+        Column("training_seconds", "Made in", "seconds"),
+    ],
+    conditions=MEASURED,
+)
 def blocks(results: Any) -> Iterator[Row]:
     """One row a coarsening, two columns a kind of blocks.
 

@@ -7,9 +7,8 @@ from typing import Any
 
 from solver.hcms.condense import DEFAULT_INTERFACE
 from studies.base.conditions import NOT_TIMED, measured
-from studies.base.entry import Row
 from studies.base.numbers import show
-from studies.base.table import Table
+from studies.base.table import Column, Row, Table, hidden, table
 
 PAPER, OURS = "relaxation", "krylov"
 ACCELERATIONS = {PAPER: "over-relaxed, as in the paper", OURS: "Krylov-accelerated"}
@@ -37,6 +36,23 @@ MEASURED = measured(
 )
 
 
+@table(
+    """Relative errors of the elastic eigenvalues against the exact ones, by start, acceleration
+    and number of corrections.""",
+    [
+        hidden("model", "Model"),
+        Column("title", "Solid"),
+        Column("modes", "Modes", "count"),
+        Column("start", "Start"),
+        Column("acceleration", "Corrections"),
+        Column("corrections", "made", "count"),
+        Column("median", "Median error", "percent"),
+        Column("p90", "90 % below", "percent"),
+        Column("max", "Worst", "percent"),
+    ],
+    keys="model start acceleration corrections",
+    conditions=MEASURED,
+)
 def convergence(results: Any) -> Iterator[Row]:
     """Errors of the elastic eigenvalues after each correction."""
     for model, history in results.convergence.items():

@@ -57,7 +57,12 @@ REPORT = Study(
     folder="",
     title="This run",
     results="results:Run",
-    page="page:page",
+    tables=(
+        *("summary", "frequencies", "errors", "coarsening", "times", "phases", "evidence"),
+        *("design", "provenance", "methods", "spreads", "ratios", "convergence", "scaling"),
+        *("blocks", "training"),
+    ),
+    target=False,
     measured=_measured,
     beside=_beside,
     figures=(

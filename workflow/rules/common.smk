@@ -37,11 +37,16 @@ def python_on(ranks):
     return "{resources.mpi} -n {resources.tasks:q} python -m mpi4py" if ranks > 1 else "python"
 
 
-def solver_command(how):
+def solver_command(how, program="solver"):
     """Shell command of the solver on ranks that share the threads of the rule."""
     threads = "$(( {threads} > {resources.tasks:q} ? {threads} / {resources.tasks:q} : 1 ))"
     python = f"OMP_NUM_THREADS={threads} {python_on(RANKS)}"
-    return f"{python} -m solver {how} --out {{output:q}} > {{log:q}} 2>&1"
+    return f"{python} -m {program} {how} --out {{output:q}} > {{log:q}} 2>&1"
+
+
+def study_command(how):
+    """The same of a study."""
+    return solver_command(f"study {how}", "carillon")
 
 
 def train_command(plan, how):

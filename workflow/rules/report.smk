@@ -61,8 +61,7 @@ rule draw_overview:
         f"{LOGS}/figures/{{model}}-overview.log",
     localrule: True
     params:
-        source=source("studies.base.scripts.plot", "workflow.report.overview"),
-        study=described(report_study.REPORT),
+        **made_by("plot", report_study.REPORT, "overview:overview_figure"),
         draw="overview:overview_figure",
     script:
         "../../studies/base/scripts/plot.py"

@@ -55,7 +55,6 @@ rule validate_model:
         response=f"{RESULTS}/models/{{model}}/response.h5",
         pictures=model_results(variants.shown_of, "figures/{model}-mode-{variant}.png"),
         description=f"{RESULTS}/figures/{{model}}-mode.json",
-        templates=templates(validation_study.VALIDATION, "page.html.j2", "tables.yaml"),
     output:
         f"{VALIDATION}/{{model}}.html",
         criteria=f"{VALIDATION}/tables/{{model}}-criteria.json",
@@ -64,7 +63,6 @@ rule validate_model:
         f"{LOGS}/validation/{{model}}.log",
     localrule: True
     params:
-        source=made_with_tables(validation_study.VALIDATION),
-        study=described(validation_study.VALIDATION, "tables", "page"),
+        **made_with_tables(validation_study.VALIDATION),
     script:
         "../../studies/base/scripts/page.py"

@@ -10,5 +10,6 @@ VALIDATION = Study(
     folder="",
     title="Validation",
     results="evidence:Evidence",
-    page="page:page",
+    tables=("criteria", "solid", "errors", "shapes", "audits", "responses", "provenance"),
+    file="validation/{model}.html",
 )

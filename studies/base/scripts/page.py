@@ -3,21 +3,20 @@
 from pathlib import Path
 
 from carillon.files.atomic import atomic_path
-from studies.base.entry import tables_of
-from studies.base.study import logged, named
+from studies.base.catalogue import all_studies
+from studies.base.study import logged
 from studies.base.table import read_table, write_table
 
 with logged(snakemake.log):
-    study = snakemake.params.study
-    folder = Path(snakemake.input.config).parent / study["folder"]
-    results = named(study["package"], study["results"])(folder, *snakemake.wildcards)
-    tables = {Path(path).stem: read_table(path) for path in snakemake.input.get("tables", [])}
+    study = all_studies()[snakemake.params.study]
+    results = study.open(Path(snakemake.input.config).parent, *snakemake.wildcards)
     page = Path(snakemake.output[0])
-    described = study.get("tables")
-    for name, make in tables_of(study["package"], described).items() if described else ():
-        if name not in getattr(results, "absent", ()):
-            tables[name] = make(results)
-            write_table(tables[name], page.parent / "tables")
-    html = named(study["package"], study["page"])(results, tables)
+    files = {Path(path).stem: path for path in snakemake.input.get("tables", [])}
+    tables = {name.removeprefix(study.prefix): read_table(files[name]) for name in files}
+    if not tables:
+        tables = study.made(results)
+        for table in tables.values():
+            write_table(table, page.parent / "tables")
+    html = study.build(results, tables)
     with atomic_path(page) as temporary:
         temporary.write_text(html, encoding="utf-8")

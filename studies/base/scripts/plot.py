@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-from studies.base.study import logged, named
+from studies.base.catalogue import all_studies
+from studies.base.study import logged
 from studies.base.style import save
 
 with logged(snakemake.log):
-    study = snakemake.params.study
-    folder = Path(snakemake.input.config).parent / study["folder"]
-    results = named(study["package"], study["results"])(folder)
-    save(
-        named(study["package"], snakemake.params.draw)(results, *snakemake.wildcards),
-        snakemake.output,
-    )
+    study = all_studies()[snakemake.params.study]
+    results = study.open(Path(snakemake.input.config).parent)
+    figure = study.named(snakemake.params.draw)(results, *snakemake.wildcards)
+    save(figure, snakemake.output)

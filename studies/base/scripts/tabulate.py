@@ -3,15 +3,14 @@
 from pathlib import Path
 
 from carillon.command_line.progress import say
-from studies.base.entry import tables_of
-from studies.base.study import logged, named
+from studies.base.catalogue import all_studies
+from studies.base.study import logged
 from studies.base.table import write_table
 
 with logged(snakemake.log):
-    study = snakemake.params.study
-    folder = Path(snakemake.input.config).parent / study["folder"]
-    results = named(study["package"], study["results"])(folder)
+    study = all_studies()[snakemake.params.study]
+    results = study.open(Path(snakemake.input.config).parent)
     if results.without:
         say(results.without)
-    for make in tables_of(study["package"], study["tables"]).values():
-        write_table(make(results), Path(snakemake.output[0]).parent)
+    for table in study.made(results).values():
+        write_table(table, Path(snakemake.output[0]).parent)
