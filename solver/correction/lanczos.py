@@ -76,7 +76,7 @@ def lanczos(
     inverse
         Exact, with the shift mu between zero and the last wanted eigenvalue.
     start
-        (local, b) first block, see `mixture.mixed` and `solver.subspace.start.start_block`.
+        (local, b) first block, see `starting_block.mixed` and `solver.subspace.start.start_block`.
     requested
         Number of modes to become accurate.
     width

@@ -25,11 +25,14 @@ FINITE_CELLS = "finite_cells"
 """Name of the group of a solid of finite cells."""
 
 
-def put(group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str) -> None:
+def put(
+    group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str | None = None
+) -> None:
     """Write one dataset with a checksum, its unit and what it is."""
     dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
     dataset.attrs["units"] = units
-    dataset.attrs["long_name"] = long_name
+    if long_name is not None:
+        dataset.attrs["long_name"] = long_name
 
 
 def put_model(group: h5py.Group, model: Solid) -> None:

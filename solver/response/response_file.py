@@ -14,6 +14,7 @@ from carillon.files.hdf5 import create_h5, open_h5
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Point, between
 from carillon.records import provenance
+from solver.files.model_group import put
 from solver.files.modes_file import read_elastic, require_same_solid
 from solver.response.contact import Contact, choose_contacts
 from solver.response.response import (
@@ -188,15 +189,15 @@ def write_response(path: str | Path, response: ResponseFile, parameters: dict[st
     """Write the file atomically; `parameters` are those of the command, for the provenance."""
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs.update(response.attributes)
-        _put(file, "seconds", response.seconds, "s")
+        put(file, "seconds", response.seconds, "s")
         for name, contact in response.contacts.items():
-            _put(file, f"points/{name}/position", contact.position, "m")
-            _put(file, f"points/{name}/inward", contact.inward, "1")
+            put(file, f"points/{name}/position", contact.position, "m")
+            put(file, f"points/{name}/inward", contact.inward, "1")
         for name, units in SEEN.items():
-            _put(file, f"seen/{name}", getattr(response.seen, name), units)
+            put(file, f"seen/{name}", getattr(response.seen, name), units)
         for name, part in response.responses.items():
-            _put(file, f"spectra/{name}/displacement", part.displacement, "m")
-            _put(file, f"spectra/{name}/sound", part.sound, "m/s")
+            put(file, f"spectra/{name}/displacement", part.displacement, "m")
+            put(file, f"spectra/{name}/sound", part.sound, "m/s")
             file[f"spectra/{name}"].attrs.update(
                 audible=part.audible,
                 difference=part.difference,
@@ -248,8 +249,3 @@ def _played(seen: dict[str, Contacts], options: StrikeOptions) -> dict[str, Arra
 
 def _distance(sound: Array, truth: Array) -> float:
     return spectral_distance(sound, truth) if truth.any() else float("nan")
-
-
-def _put(file: Any, name: str, data: Array, units: str) -> None:
-    dataset = file.create_dataset(name, data=data, fletcher32=True, chunks=True)
-    dataset.attrs["units"] = units
