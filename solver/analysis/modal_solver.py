@@ -26,7 +26,7 @@ from solver.analysis.proof import ground_truth, prove
 from solver.analysis.timing import Phases
 from solver.assembly.system import assemble
 from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
-from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
+from solver.distribution.local_mesh import distribute, scatter_moduli, with_poisson
 from solver.linear import Inverse
 from solver.subspace.weyl import CountingLaw
 
@@ -175,7 +175,14 @@ class ModalSolver:
     ) -> Modes:
         options, phases = self.options, Phases(self.comm, self._verbose)
         with phases("assembly"):
-            local_mesh = self._with_material(young, poisson, moduli_of)
+            local_mesh = self.local_mesh
+            if self.comm.bcast(young is not None):
+                moduli = compute_on_root(
+                    self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
+                )
+                local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
+            if poisson is not None:
+                local_mesh = with_poisson(local_mesh, poisson)
             similar = initial_modes if self._is_of_same_mesh(initial_modes) else None
             like = None if similar is None else similar.system
             elements = local_mesh.cells.elements
@@ -206,21 +213,6 @@ class ModalSolver:
             pairs.guard,
             pairs.inverse,
         )
-
-    def _with_material(
-        self,
-        young: Array | None,
-        poisson: float | None,
-        moduli_of: Callable[[Solid, Array], Array],
-    ) -> LocalMesh:
-        """This rank's part of the solid with another material; collective."""
-        local_mesh = self.local_mesh
-        if self.comm.bcast(young is not None):
-            moduli = compute_on_root(
-                self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
-            )
-            local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
-        return local_mesh if poisson is None else with_poisson(local_mesh, poisson)
 
     def inverse(self, modes: Modes, shift: float) -> Inverse:
         """(K - shift M)^-1 of the material that `modes` belong to, by the correction's solver."""
