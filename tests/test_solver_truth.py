@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-import solver.analysis.modal_solver as analysis
+import solver.analysis.corrected as corrected
 import solver.analysis.proof as proof
 import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
@@ -176,14 +176,14 @@ def test_too_few_modes_at_first_are_no_end(lose):
 def test_corrected_modes_that_lack_one_are_completed(monkeypatch):
     model = solids.random_box(6, 4, 3)
     exact = solids.dense_eigenvalues(model)[:40]
-    correct = analysis.correct
+    correct = corrected.correct
 
     def losing(*arguments, **options):
         result = correct(*arguments, **options)
         values, vectors = np.delete(result.values, 20), np.delete(result.vectors, 20, axis=1)
         return replace(result, values=values, vectors=vectors)
 
-    monkeypatch.setattr(analysis, "correct", losing)
+    monkeypatch.setattr(corrected, "correct", losing)
     result = modal_analysis(
         model, SolverOptions(modes=40, check_inertia=True, tolerance=1e-10), COMM
     )
