@@ -120,7 +120,7 @@ def styled(style: str, text: str) -> Markup:
 
 def key(items: Iterable[tuple[Markup, str]], label: str) -> Markup:
     """What colours stand for: names, see `styled`, and what else is said of them."""
-    lines = (element("li", name, element("span", said) if said else "") for name, said in items)
+    lines = (element("li", name + (element("span", said) if said else "")) for name, said in items)
     return element("ul", *lines, class_="key", aria_label=label)
 
 
