@@ -29,15 +29,13 @@ def problem(tmp_path_factory):
     """The targets are sounds of the fine bar, the search works with a coarse one."""
     made = small_project.project(tmp_path_factory.mktemp("project"))
     targets = small_project.targets(made)
-    return prepare(replace(made, solid=replace(made.solid, coarsen="average")), targets)
+    return prepare(replace(made, coarsen="average"), targets)
 
 
 @pytest.fixture(scope="module")
 def of_other_targets(problem):
     """A design to go on from that sounds like something else."""
-    targets = small_project.targets(
-        replace(problem.project, solid=replace(problem.project.solid, coarsen="none")), seed=5
-    )
+    targets = small_project.targets(replace(problem.project, coarsen="none"), seed=5)
     return optimise(with_options(prepare(problem.project, targets), evaluations=40))
 
 

@@ -36,7 +36,7 @@ def problem(tmp_path_factory):
     """The targets are sounds of the fine bar, the search works with a coarse one."""
     made = small_project.project(tmp_path_factory.mktemp("project"), evaluations=60)
     targets = small_project.targets(made)
-    return prepare(replace(made, solid=replace(made.solid, coarsen="average")), targets)
+    return prepare(replace(made, coarsen="average"), targets)
 
 
 def with_options(problem, **changes):

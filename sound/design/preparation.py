@@ -167,7 +167,11 @@ def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     material = problem.setting.material
     before = initial.settings.get("material", {})
     now = problem.project.material
-    same = (before.get("law"), before.get("poisson_bounds")) == (now.law, now.poisson_bounds)
+    bounds = [
+        None if each is None else tuple(each)
+        for each in (before.get("poisson_bounds"), now.poisson_bounds)
+    ]
+    same = before.get("law") == now.law and bounds[0] == bounds[1]
     if same and len(initial.coordinates) == material.dimensions:
         return initial.coordinates
     return material.coordinates(initial.young, initial.model.poisson)
