@@ -711,9 +711,11 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
     Examples
     --------
     >>> import carillon as ca
-    >>> ca.design(mesh="builtin:bar", targets=[])
-    Traceback (most recent call last):
-    carillon.errors.UserError: ...
+    >>> try:
+    ...     ca.design(mesh="builtin:bar", targets=[])
+    ... except ca.UserError as error:
+    ...     print(error)
+    targets: found [], expected at least 1 of them: ...
     """
     from carillon.files.yaml_input import read_yaml
     from sound.design.optimise import optimise
@@ -803,9 +805,11 @@ def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -
     Examples
     --------
     >>> import carillon as ca
-    >>> ca.generate("shard.h5", samples=0)
-    Traceback (most recent call last):
-    carillon.errors.UserError: ...
+    >>> try:
+    ...     ca.generate("shard.h5", samples=0)
+    ... except ca.UserError as error:
+    ...     print(error)
+    samples: found 0, expected at least 1: ...
     """
     from dataset_gen.generate import engine_of, generate_file
     from dataset_gen.settings import ShardOptions, settings_of

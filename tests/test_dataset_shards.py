@@ -223,5 +223,5 @@ def test_no_shard_at_all_is_refused():
 
 @pytest.mark.parametrize("seed", [-1, 1 << 63])
 def test_seeds_that_no_file_can_hold_are_refused(seed):
-    with pytest.raises(UserError, match=f"seed {seed}"):
+    with pytest.raises(UserError, match=f"seed: found {seed}, expected"):
         settings_of(ShardOptions(10, seed=seed))

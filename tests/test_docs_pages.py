@@ -12,6 +12,7 @@ import pytest
 
 from carillon import ROOMS
 from carillon.__main__ import STUDY, commands, studies
+from studies.base import catalogue
 from tests.documentation import CHECKOUT, DOCS, PAGES, PROSE, RUN, blocks, page_before, prose
 
 EACH = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(CHECKOUT)))
@@ -145,6 +146,7 @@ def test_commands_that_pages_name_exist():
 def test_targets_that_pages_name_exist():
     rules = [*CHECKOUT.glob("workflow/rules/*.smk"), *CHECKOUT.glob("studies/*/*.smk")]
     known = {name for file in rules for name in re.findall(r"^rule (\w+):", file.read_text(), re.M)}
+    known |= {study.name for study in catalogue.all_studies().values() if study.target}
     for page in PAGES:
         for code in inline(page):
             for name in re.findall(r"^(?:\S*/)?snakemake (?:--cores \d+ )?([a-z]\w+)$", code):

@@ -422,7 +422,7 @@ def test_only_what_was_changed_is_sent(panels):
 @pytest.mark.parametrize(
     ("label", "typed", "said"),
     [
-        ("Resolution", "3", "Resolution: found 3, expected a whole number of at least 4"),
+        ("Resolution", "1", "Resolution: found 1, expected a whole number of at least 2"),
         ("Resolution", "ten", "found ten, expected a whole number"),
         ("Modes", "1", "expected a whole number of at least 2, at most 10000 or auto."),
         ("Density", "", "Density: found nothing, expected a number"),

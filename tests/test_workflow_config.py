@@ -21,6 +21,7 @@ from forests.training.train import TrainingOptions
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
+from studies.base import catalogue
 from studies.benchmark.options import BenchmarkOptions
 from studies.scaling.runs import ScalingOptions
 from tests.configuration_keys import every_key, every_value
@@ -68,6 +69,7 @@ def test_limits_are_those_of_the_rules():
     """Every rule takes its own from the table, and none stands there for nothing."""
     rules = [*CHECKOUT.glob("workflow/rules/*.smk"), *CHECKOUT.glob("studies/*/*.smk")]
     taken = {name for file in rules for name in re.findall(r'limits\("(\w+)"', file.read_text())}
+    taken |= {f"rate_{study.name}" for study in catalogue.of_cases()}
     assert taken == set(limits())
 
 

@@ -37,7 +37,7 @@ def test_a_bad_value_on_the_command_line_stops_the_run_with_a_sentence(dry_run, 
     done = dry_run(tmp_path, "--cores", 1, "--config", "poisson=0.7")
     assert done.returncode != 0
     output = done.stdout + done.stderr
-    assert "poisson: 0.7 is greater than or equal to the maximum of 0.5" in output
+    assert "poisson: found 0.7, expected below 0.5" in output
     assert "Traceback" not in output
 
 

@@ -45,7 +45,7 @@ def below(study, names):
 
 
 def made_by(script, study, *references):
-    """Parameters of a rule of a study: the fingerprint of what its script does, and the study.
+    """Parameters of a study's script: the fingerprint of what it does, and the study.
 
     The script does it with what is named `MODULE:NAME`.
     """

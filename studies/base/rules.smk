@@ -39,7 +39,7 @@ for study in catalogue.of_cases():
             how=study.arguments(config),
             outputs=lambda wildcards, output: options(dict(output.items())),
         shell:
-            "python -m carillon study {params.study} {params.case:q} {params.how:q}"
+            "python -m carillon study {params.study:q} {params.case:q} {params.how:q}"
             " {params.outputs:q} > {log:q} 2>&1"
 
 

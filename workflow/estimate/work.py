@@ -112,7 +112,8 @@ def _sizes(job: Any, config: Mapping[str, Any]) -> dict[str, float]:
     """Sizes of a job by name: numbers of its command, and those of the model that it reads."""
     sizes, words = option_sizes(job.command), shlex.split(job.command)
     if "resolution" in sizes:
-        sizes["unknowns"] = unknowns(words[words.index("solver") + 2], int(sizes["resolution"]))
+        mesh = words[words.index("study" if "study" in words else "solver") + 2]
+        sizes["unknowns"] = unknowns(mesh, int(sizes["resolution"]))
     elif job.model in config["models"]:
         model = config["models"][job.model]
         mesh = settings.located(config, model["mesh"])
