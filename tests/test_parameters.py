@@ -19,6 +19,7 @@ from carillon.parameters.documents import parameters_from, read_parameters
 from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import Density, PoissonRatio, Resolution
 from carillon.parameters.sentences import ParameterError
+from workflow.commands.validate import ValidateOptions
 
 Vector = Annotated[tuple[float, float, float], "a position [m]"]
 
@@ -174,3 +175,10 @@ def test_fields_are_described() -> None:
     assert known["weights"].domain.is_section and known["points"].domain.items[0].is_section
     assert known["modes"].domain.words == ("auto",) and known["seconds"].domain.nullable
     assert known["resolution"].default is REQUIRED
+
+
+def test_several_words_of_an_option_are_an_item_each() -> None:
+    parser = Parser()
+    add_options(parser, ValidateOptions)
+    given = parser.parse_args(["--out", "x", "--tolerances", "residual=1e-6", "response=2"])
+    assert given.tolerances == [("residual", 1e-6), ("response", 2.0)]

@@ -11,9 +11,9 @@ from carillon.errors import UserError
 from carillon.files.paths import cause
 
 ENOUGH = 1 << 20
-"""Bytes that a run can do nothing without."""
+"""Least free bytes of a disk; a run can do nothing with less."""
 MODULES = ".snakemake/pip-deployments"
-"""Where Snakemake, and scripts of its rules, look for modules in the folder of a run."""
+"""Folders in which Snakemake and scripts of its rules look for modules, below that of a run."""
 
 
 def make_folder(folder: Path) -> None:

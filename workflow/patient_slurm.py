@@ -28,12 +28,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 FOLDER = Path(".snakemake", "slurm-commands")
-"""Where the commands are, and what they remember, in the working directory of a run."""
+"""Folder of the commands and of what they remember, in the working directory of a run."""
 LOG = "log"
 """File in there that tells what Snakemake does not."""
 COMMANDS = ("sbatch", "squeue", "sacct")
 PATIENCE_SECONDS = 3600.0
-"""How long jobs are submitted again while SLURM does not answer."""
+"""Time for which jobs are submitted again while SLURM does not answer."""
 PAUSE_SECONDS = 10.0
 """Time between two tries, and until a request that got no answer must have been carried out."""
 ANSWER_SECONDS = 50.0
@@ -47,9 +47,9 @@ NO_ANSWER = re.compile(
     "|authentication credential",
     re.IGNORECASE,
 )
-"""What `sbatch` says when it does not know whether the job was accepted; else it was refused."""
+"""Words of `sbatch` when it does not know whether the job was accepted; else it was refused."""
 STATES = "--format=%i|%T"
-"""How Snakemake asks `squeue`: number and state of each job."""
+"""Options by which Snakemake asks `squeue` for number and state of each job."""
 UNKNOWN = "UNKNOWN"
 """State on which Snakemake decides by the files of a job."""
 

@@ -28,7 +28,7 @@ NO_RESULT = ("baseline", "resources")
 DEFAULT_FORESTS = "default"
 """Name of the forests that come with the package."""
 FOLDER = Path(__file__).resolve().parent
-"""Of the rules and all that belongs to them."""
+"""Folder of the rules and all that belongs to them."""
 CONFIGURATION = "a configuration"
 
 

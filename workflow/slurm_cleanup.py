@@ -16,7 +16,7 @@ from pathlib import Path
 from carillon.command_line.progress import say
 
 PATIENCE_SECONDS = 120.0
-"""How long cancelled jobs may take to end before the run goes on without waiting."""
+"""Time for which cancelled jobs are waited for before the run goes on."""
 
 _FORMAT = "%A|%j|%k|%Z"  # number, name, comment, working directory
 _RUN = re.compile(r"(.*_)?[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")

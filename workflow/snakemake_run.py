@@ -26,7 +26,7 @@ from workflow.settings import FOLDER
 
 SNAKEFILE = FOLDER / "Snakefile"
 PROFILE = FOLDER / "profiles" / "default" / "config.yaml"
-"""How a run behaves on one machine."""
+"""Profile of a run on one machine."""
 FAILED = 1
 """Exit status of the process if the target was not made."""
 

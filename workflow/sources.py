@@ -19,7 +19,7 @@ from workflow import source_files
 ROOT = Path(__file__).resolve().parent.parent
 """Folder of the rooms."""
 SURFACE = ["carillon", "api"]
-"""What users import, and nothing in the project; it names all rooms."""
+"""Module that users import and nothing in the project does; it names all rooms."""
 OF_CARILLON = Path(rooms.PARENT)
 """Folder of `carillon`, another one if that is installed."""
 

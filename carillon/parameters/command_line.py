@@ -59,7 +59,9 @@ def _add(parser: argparse._ActionsContainer, each: Parameter, positional: bool) 
     if each.metavar is not None:
         arguments["metavar"] = each.metavar
     item = domain
-    if domain.kind is tuple and each.read is None:
+    if each.several:
+        arguments["nargs"] = "+"
+    elif domain.kind is tuple and each.read is None:
         item = replace(domain.items[0], meaning=domain.items[0].meaning or each.meaning)
         arguments["nargs"] = "+" if domain.endless else len(domain.items)
     if item.choices and not each.read:

@@ -88,6 +88,7 @@ class Parameter:
     annotation: Any
     metavar: str | tuple[str, ...] | None = None
     read: Any = None
+    several: bool = False
 
     @property
     def plain_default(self) -> Any:
@@ -122,6 +123,7 @@ def _parameter(each: dataclasses.Field[Any], annotation: Any) -> Parameter:
         annotation,
         metadata.get("metavar"),
         metadata.get("read"),
+        metadata.get("several", False),
     )
 
 

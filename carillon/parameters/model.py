@@ -75,6 +75,7 @@ def option(
     *,
     metavar: str | tuple[str, ...] | None = None,
     read: Callable[[str], Any] | None = None,
+    several: bool = False,
 ) -> Any:
     """A field of a dataclass of parameters.
 
@@ -90,8 +91,10 @@ def option(
     read
         Makes a value from the word of a command line, where the annotation does not say how; raises
         ValueError with a reason.
+    several
+        Whether `read` makes an item of the value, from each of several words.
     """
-    metadata = {"help": help, "metavar": metavar, "read": read}
+    metadata = {"help": help, "metavar": metavar, "read": read, "several": several}
     if default is REQUIRED:
         return dataclasses.field(metadata=metadata)
     if callable(default):

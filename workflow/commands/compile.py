@@ -30,7 +30,7 @@ EXAMPLES = """examples:
 
 PACKAGES = ("carillon", "dataset_gen", "forests", "solver")
 DONE = Path(__file__).parent / "__pycache__"
-"""Where is kept what was compiled."""
+"""File that records what was compiled."""
 
 GROUPS = {
     "training": (

@@ -17,14 +17,14 @@ from carillon.files.paths import cause
 
 CIRCUMSTANCES = {
     *("provenance", "timings", "hcms", "peak_memory_bytes", "ranks", "threads"),
-    *("forest_sha256", "settings", "code"),
+    *("forest_sha256", "settings", "code", "version"),
 }
 """Groups, datasets and attributes that tell where, how fast, from which files and after which wish,
 not what was found."""
 TIMES = "history/seconds"
 """A dataset of wall times among others that are none."""
 OMITTED = CIRCUMSTANCES | {"seconds", "evaluations_per_minute", "workers"}
-"""The same among attributes, and among the keys of texts in JSON."""
+"""Attributes, and keys of texts in JSON, that tell circumstances."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

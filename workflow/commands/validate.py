@@ -40,7 +40,7 @@ CONFIGURATION = "validate.yaml"
 FAILED = 1
 """Exit status if a criterion is missed."""
 LONGEST_NAME = 64
-"""Characters of a model's name; a title may be longer."""
+"""Longest name of a model in characters; a title may be longer."""
 TOLERANCES = tuple(parameters_of(TolerancesSection))
 """Names of the limits of the criteria."""
 
@@ -87,6 +87,7 @@ class ValidateOptions:
         None,
         f"limits of the criteria: {', '.join(TOLERANCES)}",
         read=_tolerance,
+        several=True,
         metavar="NAME=VALUE",
     )
 

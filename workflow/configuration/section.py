@@ -15,7 +15,7 @@ from carillon.parameters import Check
 from carillon.parameters.sentences import ParameterError
 
 LONGEST_PATH = 1000
-"""Bytes of a path; most systems take 4,096, of which results need some."""
+"""Longest path in bytes; most systems take 4,096, of which results need some."""
 PLACEHOLDERS = "{}<>"
 """Characters that Snakemake takes for the begin and end of a placeholder."""
 

@@ -28,7 +28,7 @@ from workflow.configuration.section import File, Several, Title
 FILES = {"bunny": "stanford-bunny.obj", "teapot": "teapot.obj"}
 """Mesh files of solids that studies measure by default, beside built-in ones of their own names."""
 LONGEST_SOLID = 64
-"""Characters of a solid's name."""
+"""Longest name of a solid in characters."""
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 

@@ -24,7 +24,7 @@ for `generate_shard` one shard of 400,000 samples, since the runs' own do little
 KEY = ["kind", "variant"]
 MEDIANS = ["work", "seconds", "content", "megabytes"]
 START = 1.5
-"""Seconds that a job of any rule takes to start."""
+"""Time that a job of any rule takes to start [s]."""
 
 
 def load_measured(folders: Iterable[str | Path] = ()) -> pd.DataFrame:

@@ -12,10 +12,10 @@ from workflow.estimate.plan import TARGETS
 from workflow.estimate.work import STAGES
 
 OTHER_SECONDS = 4.0
-"""Seconds of a job without a benchmark file, such as one that draws a picture."""
+"""Time of a job without a benchmark file, such as one that draws a picture [s]."""
 
 FAR = 5.0
-"""How many times the work that was measured is far beyond it."""
+"""Multiple of the measured work from which on an estimate is said to be far beyond it."""
 
 SUMMED = ["jobs", "core_hours", "wall_hours", "kept_gb"]
 HEADER = f"{'stage':<25}  jobs  core-hours  wall time    memory     files"
