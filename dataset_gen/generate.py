@@ -27,7 +27,7 @@ Engine = Callable[[ShardPlan, range], Generator[bytes, None, None]]
 """Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
 
 _ENVIRONMENT = ("commit", "versions", "processor")
-"""What an interrupted shard may have different when it is gone on with."""
+"""Attributes of an interrupted shard that may differ when it is gone on with."""
 
 
 def engine_of(workers: int) -> Engine:

@@ -40,7 +40,7 @@ PATTERNS = 1 << FEATURES
 """Void patterns of the seven other cells, seen from an origin: bit k is set if e'(k+2) is void."""
 
 LARGEST_MODULUS = 1e300
-"""In any unit; sums of eight of them are still finite."""
+"""Largest modulus of a cell in any unit; sums of eight of them are still finite."""
 
 Features = NDArray[np.float32]
 

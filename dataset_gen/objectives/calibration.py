@@ -14,10 +14,8 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.block import least_patterns, pattern_images, symmetries
 from carillon.fem.element import Array
 
 FILE = "calibration.json"
@@ -47,23 +45,6 @@ class Calibration:
     galerkin_void: float
     lumped_share: float
     provenance: dict[str, Any]
-
-
-@cache
-def octant_orbits() -> tuple[NDArray[np.int64], int]:
-    """Number of the free factor of each octant (256, 8) of each void pattern, and their count.
-
-    Octants that a symmetry of the pattern exchanges have one number. Rows of patterns that are not
-    the least of their class are 0 and mean nothing, like those of `Calibration.factors`.
-    """
-    numbers = np.zeros((256, 8), dtype=np.int64)
-    count = 0
-    for mask in least_patterns():
-        exchanged = symmetries()[pattern_images()[mask] == mask].min(axis=0)
-        _, orbit = np.unique(exchanged, return_inverse=True)
-        numbers[mask] = count + orbit.ravel()
-        count += int(orbit.max()) + 1
-    return numbers, count
 
 
 def parse(content: Mapping[str, Any]) -> Calibration:

@@ -77,7 +77,7 @@ class DescentState(NamedTuple):
 
 
 VALUE, GRADIENT, HESSIAN, CURVATURE, DERIVATIVES = 0, 1, 9, 73, 137
-"""Where the parts of `here` and `there` begin, and how many numbers there are."""
+"""Offsets of the parts of `here` and `there`, and the count of their numbers."""
 
 
 @compiled

@@ -146,4 +146,4 @@ GROWERS: dict[str, Callable[[Rows, TreeLimits, int], Tree]] = {
     "best": _by_variance("DecisionTreeRegressor", SPLIT_FEATURES),
     "extra": _by_variance("ExtraTreeRegressor", FEATURES),
 }
-"""How trees are grown; `best` is that of the paper and of random forests."""
+"""Ways to grow trees; `best` is that of the paper and of random forests."""

@@ -57,12 +57,12 @@ class ModesEvidence:
         `NEGLIGIBLE`, that ratio.
     rounding
         (k,) by how much each eigenvalue changes, relatively, if every product with an entry of K is
-        rounded once: the unit roundoff times |x|^T |K| |x| / lambda.
+        rounded once: the unit roundoff times `|x|^T |K| |x| / lambda`.
     quotient_errors
         (k,) relative difference of each eigenvalue from the Rayleigh quotient of its mode; 0 of
         rigid ones.
     orthogonality
-        Largest entry of |X^T M X - I|.
+        Largest entry of `|X^T M X - I|`.
     rigid_modes
         Number of eigenvalues that are zero to rounding.
     counted_below, counted, expected

@@ -47,7 +47,7 @@ WAYS = {
 }
 """Discretisation, and the expected error down to which its cells are divided."""
 REFERENCE = 0.002
-"""The same of references."""
+"""Expected error down to which the cells of a reference are divided."""
 FACTOR = 3.0
 """An expected error that is wrong by no more counts as right."""
 

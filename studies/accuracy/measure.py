@@ -28,12 +28,12 @@ ELASTIC = 30
 """Frequencies compared."""
 MODES = RIGID_MODES + ELASTIC
 LOWER = 2
-"""How much lower degrees are by which the references are judged."""
+"""Difference of degrees by which the references are judged."""
 
 FINER = {"voxel": 0.7, "linear tetrahedra": 0.7, "quadratic tetrahedra": 0.9}
 """Spacings relative to those of finite cells, so that unknowns and times reach as far as theirs."""
 BASE = "finite-cell"
-"""What sets the unknowns and the time at which all are compared."""
+"""Discretisation whose unknowns and times all others are compared at."""
 
 LEVELS = max(len(solid.spacings) for solid in SOLIDS.values())
 

@@ -24,7 +24,7 @@ ANGLES = (25.0, 35.0, 15.0)
 YOUNG, POISSON, DENSITY = 1e9, 0.25, 1000.0
 
 SUBDIVISIONS = 5
-"""Of an icosahedron, for an ellipsoid's surface."""
+"""Subdivisions of an icosahedron for the surface of an ellipsoid."""
 SECTIONS = 192
 """Straight sides of a cylinder's surface."""
 

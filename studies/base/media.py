@@ -28,7 +28,7 @@ Pixels = NDArray[np.uint8]
 
 PICTURE_INCHES = (3.4, 2.7)
 COLOUR_MAP = "viridis"
-"""Of materials."""
+"""Colour map of materials."""
 ROOM_FOR_ARROW = 0.12
 """Share of the picture that its border takes where an arrow may reach beyond the solid."""
 PEAK = 0.9

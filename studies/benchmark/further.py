@@ -117,7 +117,7 @@ RIVALS = {
         lumped=True,
     ),
 }
-"""In the order of the table."""
+"""Rivals in the order of the table."""
 ALL = "all"
 """Stands for every one of them."""
 

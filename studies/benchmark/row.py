@@ -49,7 +49,7 @@ MEANING = {
     "searches that it is not charged for",
     "frequency_error": "of the coarse model, by mode number, relative to SLEPc on the fine mesh",
 }
-"""What the figures of a row mean, for the row itself."""
+"""Meaning of the figures of a row, kept with the row."""
 
 
 def benchmark_row(

@@ -155,4 +155,4 @@ METHODS = {
     ),
     **{name: _further(name) for name in RIVALS},
 }
-"""In the order in which they run."""
+"""Methods in the order in which they run."""

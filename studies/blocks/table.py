@@ -38,7 +38,7 @@ TIMED_BLOCKS, FEWEST_TIMED = 2000, 64
 """Blocks that a run for the cost per block takes, at the most and at the least."""
 
 TIMED_SECONDS = 0.2
-"""What a run shall take, as far as these numbers allow."""
+"""Time that a timed run is to take, as far as these numbers allow [s]."""
 
 TIMED_RUNS = 5
 """Runs whose median is the cost per block, after one that warms up; min and max are kept too."""

@@ -12,7 +12,7 @@ from studies.campaign.cells import SECTION, Cell, cells_of
 from workflow import solids
 
 FAILED, WRONG, MISSED, PASSED = "not run", "wrong", "missed", "passed"
-"""How a cell ended, the worst first."""
+"""Ends of a cell, the worst first."""
 ENDS = (FAILED, WRONG, MISSED, PASSED)
 SMALLEST = 1e-300
 """Least limit that a share is taken of."""

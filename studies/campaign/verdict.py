@@ -16,7 +16,7 @@ from carillon.records import provenance
 from studies.campaign.results import FAILED, PASSED, Campaign, end_of
 
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd]")
-"""Characters that XML has no place for."""
+"""Characters that XML cannot hold."""
 
 
 def as_json(study: Campaign) -> dict[str, Any]:

@@ -22,4 +22,4 @@ MEASURES: dict[str, Callable[[Claims], Finding]] = {
     "response": of_motion.response,
     "scene": of_motion.scene,
 }
-"""By the claim's name in `claims.yaml`."""
+"""Measures of claims by the claim's name in `claims.yaml`."""

@@ -20,7 +20,7 @@ from workflow.report.convergence_tables import ACCELERATIONS, PAPER, RANDOM, SYN
 
 THREE_ORDERS, TWO_ORDERS = 1e3, 1e2
 INTERACTIVE = 3.0
-"""Seconds of a solve that the paper finds interactive."""
+"""Time of a solve that the paper finds interactive [s]."""
 
 
 def convergence(claims: Claims) -> Finding:

@@ -10,7 +10,7 @@ from studies.claims.results import Claims
 from studies.claims.tables import NO_MESH
 
 STYLES = {REPRODUCED: "passed", LESS: "passed", IN_PART: "", NOT: "failed"}
-"""Of the tiles that count verdicts."""
+"""Styles of the tiles that count verdicts."""
 
 
 def page(claims: Claims, tables: dict[str, Table]) -> StudyPage:

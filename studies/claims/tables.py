@@ -18,7 +18,7 @@ from studies.claims.results import FULL, MEASURED, SCENE_TABLE, Claims
 TEXTS: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_name("claims.yaml"))
 NO_MESH = "mesh not at hand"
 MARKS = {REPRODUCED: "met", LESS: "met", NOT: "missed"}
-"""How verdicts are marked on the page."""
+"""Marks of verdicts on the page."""
 COMMANDS = {
     f"{FULL}/": "snakemake figures",
     SCENE_TABLE: "snakemake scene_spectra",
@@ -26,7 +26,7 @@ COMMANDS = {
     "validation/": "snakemake (make run)",
     "tables/": "snakemake (make run)",
 }
-"""What makes a file, by the beginning of its name."""
+"""Commands that make a file, by the beginning of its name."""
 
 
 @table(

@@ -14,7 +14,7 @@ from studies.comparison.folders import Folder
 from studies.comparison.noise import SAME, VERDICTS, Value, verdict
 
 APART = "/provenance"
-"""How the paths of tables end that are told as conditions instead."""
+"""Endings of paths of tables that are shown as conditions instead."""
 SIDES = ("before", "now")
 
 

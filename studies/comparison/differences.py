@@ -15,7 +15,7 @@ from workflow.settings import PLACES
 UNIMPORTANT = ("spread", "date", "differing")
 """Conditions that may differ: how a spread is told, and what says nothing about a number."""
 Difference = dict[str, str]
-"""What is not the same: `what` for people, its values `before` and `now`, tables `where`."""
+"""Something that differs: `what` for people, its values `before` and `now`, tables `where`."""
 Told = Mapping[str, Mapping[str, str]]
 """What is told for every table, by names for people."""
 

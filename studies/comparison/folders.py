@@ -16,12 +16,12 @@ from studies.comparison.cells import cells_of
 PARTS = ("tables", "paper/tables", "forests_study/tables")
 """Folders of tables below a folder of results."""
 READERS = {".csv": read_csv_table, ".json": read_table}
-"""How a table is read, by the ending of its file; the last file that exists counts."""
+"""Readers of tables by the ending of the file; the last file that exists counts."""
 _SENSELESS = (
     *(ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError),
     *(RecursionError, csv.Error),
 )
-"""What a file that is no table leads to."""
+"""Exceptions on reading a file that is no table."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ WORSE = (SLOWER, LESS_ACCURATE, LARGER)
 BETTER = (FASTER, MORE_ACCURATE, SMALLER)
 OTHER = (CHANGED, GONE, NEW)
 VERDICTS = (*WORSE, *BETTER, *OTHER)
-"""What is said of numbers that moved, the worst first."""
+"""Verdicts on numbers that moved, the worst first."""
 
 TIME_TOLERANCE = 0.1
 """Least relative move of a time whose spread is known."""
@@ -42,7 +42,7 @@ SAYINGS = {
     "score": (MORE_ACCURATE, LESS_ACCURATE),
     "bytes": (LARGER, SMALLER),
 }
-"""What is said of a number that moved up, and of one that moved down, by its kind."""
+"""Words for a number that moved up and for one that moved down, by its kind."""
 UNJUDGED = ("modelled", "misfit")
 """Kinds of numbers that are not compared."""
 

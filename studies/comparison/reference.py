@@ -19,13 +19,13 @@ from studies.comparison.comparison import APART
 from studies.comparison.folders import Folder, read_folder
 
 FOLDER = "reference"
-"""Below the results; in it, a folder for each processor that a run was made on."""
+"""Folder below the results; it has one for each processor that a run was made on."""
 DIGITS = 7
 """Significant digits that are kept: more than any rule of the comparison looks at."""
 LONG = 200
 """Rows from which on a table is kept as CSV alone."""
 LARGE = 300_000
-"""Bytes from which on the folder is too large to be kept with the source."""
+"""Size of the folder in bytes from which on it is too large to be kept with the source."""
 TIMED = "tables/times"
 """Table whose conditions are those of the run."""
 OF_TABLES = ("runs", "spread")

@@ -31,7 +31,7 @@ TITLE = "What moved"
 RAW = [*KEYS, "kind", *(f"{side}{end}" for side in SIDES for end in ENDS), "ratio", "verdict"]
 CLASSES = {"worse": WORSE, "better": BETTER, "other": OTHER}
 MARKS = {**dict.fromkeys(WORSE, "worse"), **dict.fromkeys(BETTER, "better")}
-"""How verdicts are marked on a page."""
+"""Marks of verdicts on a page."""
 
 
 def write(comparison: Comparison, folder: Path) -> None:

@@ -23,7 +23,7 @@ COLOUR = {
     "cells": COLOURS["hcms_ec"],
 }
 MARKERS = "osD^vP*Xph<>"
-"""Of the solids, in turn."""
+"""Markers of the solids, in turn."""
 SMALLEST = 1e-4
 """Smaller errors are drawn there."""
 PANELS = 2

@@ -7,7 +7,7 @@ from typing import Any
 from studies.base.cases import Case, CaseResults
 
 SOLID, VOXELS = "solid", "voxels"
-"""What errors are against: the solid itself, and its voxels."""
+"""References of errors: the solid itself, and its voxels."""
 
 
 class DiscretisationStudy(CaseResults):

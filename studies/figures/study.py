@@ -11,7 +11,7 @@ MEASURES = {
     "convergence": "figures.convergence",
     "scaling": "figures.scaling",
 }
-"""Where the configuration names the solids that are measured, by the file of the result."""
+"""Keys of the configuration that name the measured solids, by the file of the result."""
 
 FIGURES = Study(
     name="figures",

@@ -22,15 +22,15 @@ from studies.recordings.measurement import MODES, extract
 Array = NDArray[np.float64]
 
 RECORDING = "agogo-high"
-"""That which is written in other formats."""
+"""Recording that is written in other formats."""
 HIGHEST_HERTZ = 8000.0
 """Frequency up to which modes are compared: all rates hold it."""
 SPAN_DECIBELS = 40.0
-"""How far below the loudest a mode may be that is looked for."""
+"""Level below the loudest mode down to which modes are looked for [dB]."""
 SAME_CENTS = 1.0
 """Difference of two frequencies that are the same mode's."""
 LEVELS = (1.2, 0.8)
-"""Of two channels; the louder one is searched."""
+"""Levels of two channels; the louder one is searched."""
 SUBTYPES = {"PCM_U8": "8 bit", "PCM_16": "16 bit", "PCM_24": "24 bit", "FLOAT": "float"}
 """Formats of samples, and what people call them."""
 RATES = (22_050, 44_100, 48_000, 96_000, 192_000)

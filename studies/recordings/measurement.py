@@ -21,7 +21,7 @@ from carillon.records.measurement import measured
 from sound.clips.wav import write_wav
 
 MODES, RESIDUAL, RUN = "modes.json", "residual.wav", "run.json"
-"""What `extract` writes, and what is told of its run."""
+"""Files that `extract` writes, and the file about its run."""
 _START_RATE, _START_SAMPLES = 8000, 800
 
 

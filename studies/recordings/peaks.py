@@ -12,11 +12,11 @@ from scipy.signal import find_peaks
 Array = NDArray[np.float64]
 
 LOWEST_HERTZ, HIGHEST_SHARE = 40.0, 0.45
-"""Where peaks are looked for: from a frequency to a share of the sampling rate."""
+"""Lowest frequency of peaks [Hz], and the highest as a share of the sampling rate."""
 SPAN_DECIBELS = 40.0
-"""How far below the loudest one a peak may be."""
+"""Level below the loudest peak down to which peaks count [dB]."""
 ABOVE_MEDIAN, MEDIAN_HERTZ = 15.0, 200.0
-"""How far a peak stands out of the median [dB] of what is as near to it on either side."""
+"""Height of a peak above the median [dB], and the reach of that median to either side [Hz]."""
 PROMINENCE = 12.0
 """Depth [dB] of the valleys beside it."""
 SAME_CENTS, SAME_BINS = 20.0, 0.5

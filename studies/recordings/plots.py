@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 FLOOR_DECIBELS = -80.0
 """Level below which nothing is drawn."""
 _POINTS = 1200
-"""Of a line across the figure; more would not be seen."""
+"""Points of a line across the figure; more would not be seen."""
 
 
 def spectrum_figure(results: RecordingResults) -> Figure:

@@ -17,9 +17,10 @@ PACKAGES = "packages"
 EXTRACTED = "extracted"
 """Folder of the files of a recording below its own."""
 START, FORMATS = "start.json", "formats.json"
-"""What the start of the program takes, and a recording in other formats, below the study's."""
+"""Files below the study's folder: the time of the program's start, and a recording in other
+formats."""
 CALIBRATION, HELD_BACK = SPLITS = ("calibration", "held back")
-"""What a recording may be used for."""
+"""Purposes of a recording."""
 
 
 @dataclass(frozen=True)

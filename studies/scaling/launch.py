@@ -25,7 +25,7 @@ LAUNCHER = "mpiexec"
 MOST_RANKS = 1024
 """Ranks that a study of scaling starts."""
 RANKS_OF_CORE = 16
-"""The same for each core of the machines it runs on."""
+"""Most ranks for each core of the machines they run on."""
 _ALLOWED = {
     # Open MPI binds ranks to cores, refuses root and more ranks than cores, unless told otherwise.
     "OMPI_MCA_hwloc_base_binding_policy": "none",
@@ -35,7 +35,7 @@ _ALLOWED = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-"""What lets any number of ranks run; other MPIs take no notice."""
+"""Variables that let any number of ranks run; other MPIs take no notice."""
 
 
 def measure_each(

@@ -17,7 +17,7 @@ from solver.hcms.counts import SENT_A_COLUMN, SHARED_COST
 from studies.scaling.work import Work
 
 ASSUMED_LATENCY, ASSUMED_BANDWIDTH = 2e-6, 5e9
-"""Seconds a message and bytes per second where only one rank was measured."""
+"""Latency of a message [s] and bandwidth [B/s] where only one rank was measured."""
 MISFIT_LIMIT = 0.3
 """Largest relative difference from the measurements with which the model goes beyond them."""
 MODELLED = ("assembly", "local", "merge", "down", "basis", "factor", "solve", "dense")
@@ -38,9 +38,9 @@ ASSUMPTIONS = (
     "there are as many subdomains as ranks at least, which are then smaller",
     "partition and elimination plan are not in it: they are made once for any material",
 )
-"""What the model takes for granted."""
+"""Assumptions of the model."""
 WEAK_ASSUMPTIONS = ("the subdomains of a solid that grows are equally large and joined in pairs",)
-"""The same where the solid grows with the ranks."""
+"""Assumptions where the solid grows with the ranks."""
 
 Run = dict[str, Any]
 Row = dict[str, Any]

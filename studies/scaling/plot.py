@@ -24,7 +24,7 @@ TITLES = {"strong": "Strong: one solid", "weak": "Weak: unknowns grow with ranks
 NARROWEST = 7.6
 """Inches that the legend needs."""
 SMALLEST = 1e-4
-"""Seconds at which the axis ends."""
+"""Time at which the axis ends [s]."""
 
 
 def save_plot(result: dict[str, Any], path: str | Path) -> None:

@@ -40,7 +40,7 @@ OUTPUTS = {
 }
 """Options of `studio scene` that name files, and the files."""
 TOLD = "scene.json"
-"""What `studio scene --json` tells."""
+"""File with the output of `studio scene --json`."""
 SAID = ("title", "seconds", "ground_material", "camera")
 """Keys of a scene's file that its description holds as they are."""
 BARS = "builtin:bars"
@@ -48,9 +48,9 @@ BARS = "builtin:bars"
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """Turn [rad] from one seed of a sunflower to the next."""
 SEMITONES = 12
-"""Of an octave."""
+"""Semitones of an octave."""
 DIGITS = 4
-"""Of places behind the point [m]."""
+"""Digits behind the point of places [m]."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ _MAKERS: dict[str, Callable[[Entry, Mapping[str, Any]], tuple[list[str], list[En
     "falling": _falling,
     "bowled": _bowled,
 }
-"""What the objects of the scenes are that have a file."""
+"""Makers of the files of the scenes' objects."""
 
 
 def _design(name: str, config: Mapping[str, Any]) -> Entry:

@@ -53,11 +53,11 @@ Tables = dict[str, Table]
 SHOWN_SECONDS, PLAYED_SECONDS = 1.0, 2.0
 """Longest time of a spectrogram and of a player."""
 DIGITS = 6
-"""Of coordinates after the point."""
+"""Digits of coordinates behind the point."""
 ROOM_ABOVE = 1.5
 """Highest frequency of a spectrogram over that of the highest target."""
 SHOWN_HERTZ = 8000.0
-"""Up to which the spectrograms of modes alone show those of the clip at least."""
+"""Frequency up to which spectrograms of modes alone reach at least [Hz]."""
 STATES = {
     "before": "Before",
     CLIPS: "Target",
@@ -70,7 +70,7 @@ ALONE = {
     "wanted": "Modes designed",
     "fine": "The same modes of the design, on the fine model",
 }
-"""What is shown of modes alone, and names for people."""
+"""Modes that are shown alone, and their names for people."""
 SOUNDS = """Every point is struck along the inward normal. Before is the uniform material that the
     search began with; on the fine model the material found is solved without coarsening. Levels are
     below the loudest of the target, on one scale in every group. Noise of the clips is added to all

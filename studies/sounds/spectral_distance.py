@@ -10,7 +10,7 @@ from solver.response.response import spectrogram
 Array = NDArray[np.float64]
 
 CENTRES = 1e3 * 10.0 ** (np.arange(-10, 13) / 10.0)
-"""Of third-octave bands, from 100 Hz to 16 kHz [Hz]."""
+"""Centres of third-octave bands from 100 Hz to 16 kHz [Hz]."""
 FLOOR_DECIBELS = -60.0
 """Level below the loudest of the target at which silence begins."""
 

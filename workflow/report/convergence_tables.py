@@ -12,7 +12,7 @@ from studies.base.table import Column, Row, Table, hidden, table
 
 PAPER, OURS = "relaxation", "krylov"
 ACCELERATIONS = {PAPER: "over-relaxed, as in the paper", OURS: "Krylov-accelerated"}
-"""How corrections are accelerated, and the names of that for people."""
+"""Accelerations of the corrections and their names for people."""
 SYNTHESIS, RANDOM = f"hcms-{DEFAULT_INTERFACE}", "random"
 """The solver's own start, and one that knows nothing."""
 

@@ -13,7 +13,7 @@ MEASURES = {
     "methods": "times.models",
     "scaling": "scaling.models",
 }
-"""Where the configuration names the models that are measured, by the file of the result."""
+"""Keys of the configuration that name the measured models, by the file of the result."""
 
 
 def _by_variant(

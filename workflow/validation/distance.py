@@ -11,7 +11,7 @@ from workflow.validation.evidence import Evidence
 
 TEXTS: dict[str, Any] = read_own_yaml(Path(__file__).with_name("distance.yaml"))
 MODELS = {"voxel": "voxels", "finite-cell": "finite cells"}
-"""What a discretisation consists of."""
+"""Elements of a discretisation, in words."""
 
 
 def distance_in_words(evidence: Evidence) -> dict[str, str]:
