@@ -130,7 +130,7 @@ def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """What a solid is made of.
+    """Material of a solid: its moduli, Poisson's ratio and density.
 
     Attributes
     ----------
@@ -293,7 +293,7 @@ class Solution:
             grid.write(temporary, file_format="vtu")
 
     def _file(self) -> ModesFile:
-        """What its modes file holds."""
+        """Content of its modes file."""
         from solver.files.modes_file import ModesFile
 
         if self.solid is None or self.shapes is None:
@@ -639,12 +639,12 @@ class Design:
 
     @property
     def frequencies(self) -> Array:
-        """Of the elastic modes (n,) [Hz], ascending."""
+        """Frequencies of the elastic modes (n,) [Hz], ascending."""
         return self.found.frequencies
 
     @property
     def target_frequencies(self) -> Array:
-        """Of the clips (n,) [Hz]."""
+        """Frequencies of the clips' modes (n,) [Hz]."""
         return self.found.targets.frequencies
 
     @property

@@ -162,7 +162,7 @@ def parse_yaml(text: str) -> Any:
 
 
 def _parsed(text: str) -> tuple[Any, Any]:
-    """What a text says, and its node."""
+    """Values of a YAML text, and the node that they were made from."""
     try:
         loader = _Loader(text)
         node = loader.get_single_node()

@@ -1,4 +1,4 @@
-"""What the fields of a dataclass of parameters are, read from their annotations."""
+"""Fields of a dataclass of parameters: values, limits and meaning, read from annotations."""
 
 from __future__ import annotations
 

@@ -124,14 +124,14 @@ def _followed(
 
 
 def no_key(name: str, known: list[str]) -> str:
-    """What is wrong with a key that is not among those that are known."""
+    """Reason for refusing a key that is not among the known ones."""
     suggestion = alike(name, known)
     hint = f"; did you mean {suggestion}?" if suggestion else ""
     return f"there is no key {name!r}, only {', '.join(known)}{hint}"
 
 
 def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
-    """What would fit the rule that was broken."""
+    """Words for the values that the broken rule admits."""
     if kind in _RULES:
         bound = _RULES[kind].format(
             **{key: _limit(value) for key, value in context.items() if key in _LIMITS}
