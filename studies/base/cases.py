@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -10,8 +10,18 @@ from typing import Any
 from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.study import Study, no_files
-from studies.base.table import Row
+from studies.base.table import Column, Row, hidden
 from workflow import solids
+
+ALL = "all"
+"""Name that stands for every material in pooled tables."""
+CASE_COLUMNS = (
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("resolution", "Resolution", "count"),
+    Column("material", "Material"),
+)
+"""Columns that tell cases apart."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +36,19 @@ class Case:
     def path(self) -> str:
         """Name of the result file below the folder of the cases."""
         return f"{self.solid}/{self.resolution}-{self.material}.json"
+
+
+def error_columns(materials: Iterable[str]) -> list[Column]:
+    """Columns of the rms and the worst error with each material, and with all of them."""
+    return [
+        column
+        for each in (*materials, ALL)
+        for column in (
+            Column(f"{each}_rms", f"{each.capitalize()}, rms", "percent"),
+            Column(f"{each}_worst", "worst", "percent"),
+            hidden(f"{each}_where", "at"),
+        )
+    ]
 
 
 @dataclass(frozen=True)

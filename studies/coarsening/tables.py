@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.stats
 
-from studies.base.cases import Case, truths_of
+from studies.base.cases import ALL, CASE_COLUMNS, Case, error_columns, truths_of
 from studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from studies.base.numbers import show
 from studies.base.table import Column, Row, hidden, table
@@ -15,8 +15,6 @@ from studies.coarsening.results import MODELS as MODELS
 from studies.coarsening.results import CoarseningStudy
 
 FIRST = 7
-ALL = "all"
-"""Stands for every material in the pooled table."""
 LABELS = {"plain": "Coarse", "refined": "Refined"}
 KINDS = ("by_index", "recognised", "expected")
 VERDICTS = ("swap", "local", "error")
@@ -41,15 +39,7 @@ UNTIMED, ONE_RUN = (
     ),
     lambda study: [
         Column("model", "Model"),
-        *(
-            column
-            for each in study.part["materials"] + [ALL]
-            for column in (
-                Column(f"{each}_rms", f"{each.capitalize()}, rms", "percent"),
-                Column(f"{each}_worst", "worst", "percent"),
-                hidden(f"{each}_where", "at"),
-            )
-        ),
+        *error_columns(study.part["materials"]),
         Column("far_off", "Modes far off", "count"),
         Column("swap", "swapped", "count"),
         Column("local", "local", "count"),
@@ -202,10 +192,7 @@ def cases(study: CoarseningStudy) -> Iterator[Row]:
     those of the model that SLEPc's run takes. Correlations are those of expected and true
     errors by ranks, mode by mode.""",
     [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("resolution", "Resolution", "count"),
-        Column("material", "Material"),
+        *CASE_COLUMNS,
         Column("cells", "Voxels", "count"),
         Column("blocks", "Elements", "count", source="plain.elements"),
         Column("fine_blocks", "Fine blocks", "count", source="refined.fine_blocks"),
@@ -370,10 +357,7 @@ def filled_cells(pattern: int) -> str:
     """Ground truth of every case by SLEPc on the fine mesh: eigenvalues found below a shift μ,
     and counted there by the inertia of K − μM.""",
     [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("resolution", "Resolution", "count"),
-        Column("material", "Material"),
+        *CASE_COLUMNS,
         Column("unknowns", "Unknowns", "count", source="n_dofs"),
         Column("inertia", "Found / counted"),
         Column("residual_max", "Largest residual", "small"),

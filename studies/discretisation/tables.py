@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.base.cases import Case
+from studies.base.cases import CASE_COLUMNS, Case
 from studies.base.conditions import IN_COLUMNS, NOT_TIMED, Repeats, measured
 from studies.base.table import Column, Row, hidden, spread, table
 from studies.discretisation.results import SOLID, VOXELS, DiscretisationStudy
@@ -149,10 +149,7 @@ def cases(study: DiscretisationStudy) -> Iterator[Row]:
         of the voxels; the doubt is as much: rms and largest over modes {FIRST}–{study.last}."""
     ),
     [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("resolution", "Resolution", "count"),
-        Column("material", "Material"),
+        *CASE_COLUMNS,
         Column("unknowns", "Unknowns", "count", source="n_dofs"),
         Column("doubt_rms", "Doubt, rms", "percent"),
         Column("doubt_worst", "largest", "percent"),

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from solver.coarsening.forest import FOREST
-from studies.base.cases import Case
+from studies.base.cases import CASE_COLUMNS, Case
 from studies.base.results import spelt
 from studies.base.table import Column, Row, hidden, table
 from studies.objectives.results import FIRST, Objectives
@@ -145,10 +145,7 @@ def goals(study: Objectives) -> Iterator[Row]:
     """Every case that a goal is about: the limit, and the value of each objective.""",
     lambda study: [
         Column("goal", "Goal"),
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("resolution", "Resolution", "count"),
-        Column("material", "Material"),
+        *CASE_COLUMNS,
         Column("limit", "Limit", "percent"),
         *(
             column

@@ -12,14 +12,12 @@ import pandas as pd
 import carillon.fem.materials
 from dataset_gen.objectives.fitting import module_of
 from solver.coarsening.forest import FOREST
-from studies.base.cases import Case, truths_of
+from studies.base.cases import ALL, CASE_COLUMNS, Case, error_columns, truths_of
 from studies.base.table import Column, Row, hidden, table
 from studies.objectives.goals import goal_cases as goal_cases
 from studies.objectives.goals import goals as goals
 from studies.objectives.results import FIRST, Objectives
 
-ALL = "all"
-"""Stands for every material in the pooled tables."""
 BASELINES = {
     "galerkin": "No fit: the moduli that give the Galerkin projection of the fine stiffness.",
     "average": "No fit: the mean of the block’s eight moduli at every point.",
@@ -35,15 +33,7 @@ BASELINES = {
     ),
     lambda study: [
         Column("coarsening", "Objective"),
-        *(
-            column
-            for each in study.part["materials"] + [ALL]
-            for column in (
-                Column(f"{each}_rms", f"{each.capitalize()}, rms", "percent"),
-                Column(f"{each}_worst", "worst", "percent"),
-                hidden(f"{each}_where", "at"),
-            )
-        ),
+        *error_columns(study.part["materials"]),
     ],
 )
 def summary(study: Objectives) -> list[Row]:
@@ -60,15 +50,7 @@ def summary(study: Objectives) -> list[Row]:
     ),
     lambda study: [
         Column("coarsening", "Objective"),
-        *(
-            column
-            for each in study.part["materials"] + [ALL]
-            for column in (
-                Column(f"{each}_rms", f"{each.capitalize()}, rms", "percent"),
-                Column(f"{each}_worst", "worst", "percent"),
-                hidden(f"{each}_where", "at"),
-            )
-        ),
+        *error_columns(study.part["materials"]),
     ],
 )
 def summary_all(study: Objectives) -> list[Row]:
@@ -106,10 +88,7 @@ def _pooled(study: Objectives, part: str) -> list[Row]:
     jobs beside it: of the fits, equal blocks once, with what each void pattern needs once, and
     of the coarse model’s modes by SLEPc.""",
     lambda study: [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("resolution", "Resolution", "count"),
-        Column("material", "Material"),
+        *CASE_COLUMNS,
         Column("unknowns", "Unknowns", "count", source="n_dofs"),
         Column("coarse_unknowns", "coarsened", "count", source="coarse_n_dofs"),
         Column("coarsening", "Objective"),
@@ -192,10 +171,7 @@ def _forest_row(study: Objectives, title: str, ratios: dict[Case, float]) -> Row
     """Ground truth of every case by SLEPc on the fine mesh: eigenvalues found below a shift μ,
     and counted there by the inertia of K − μM; wall seconds on one core.""",
     [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("resolution", "Resolution", "count"),
-        Column("material", "Material"),
+        *CASE_COLUMNS,
         Column("unknowns", "Unknowns", "count", source="n_dofs"),
         Column("coarse_unknowns", "coarsened", "count", source="coarse_n_dofs"),
         Column("blocks", "Blocks", "count"),
