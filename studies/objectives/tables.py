@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import statistics
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ import carillon.fem.materials
 from dataset_gen.objectives.fitting import module_of
 from solver.coarsening.forest import FOREST
 from studies.base.cases import ALL, CASE_COLUMNS, Case, error_columns, truths_of
-from studies.base.table import Column, Row, hidden, table
+from studies.base.table import Column, Row, Tabulation, hidden, table
 from studies.objectives.goals import goal_cases as goal_cases
 from studies.objectives.goals import goals as goals
 from studies.objectives.results import FIRST, Objectives
@@ -24,35 +24,29 @@ BASELINES = {
 }
 
 
-@table(
-    lambda study: (
-        f"""Relative errors of the frequencies of modes {FIRST}–{study.last("audible")} against
-        SLEPc on the fine mesh, modes matched by index, by objective and material: root mean
-        square over all solids and resolutions, each weighing the same, and the worst single
-        frequency, negative if too low. The smallest rms over all materials comes first."""
-    ),
-    lambda study: [
-        Column("coarsening", "Objective"),
-        *error_columns(study.part["materials"]),
-    ],
-)
+def _errors_of(part: str) -> Callable[[Callable[[Objectives], list[Row]]], Tabulation]:
+    """Make a table of a function that pools the errors of a part of the modes."""
+    return table(
+        lambda study: (
+            f"""Relative errors of the frequencies of modes {FIRST}–{study.last(part)} against
+            SLEPc on the fine mesh, modes matched by index, by objective and material: root mean
+            square over all solids and resolutions, each weighing the same, and the worst single
+            frequency, negative if too low. The smallest rms over all materials comes first."""
+        ),
+        lambda study: [
+            Column("coarsening", "Objective"),
+            *error_columns(study.part["materials"]),
+        ],
+    )
+
+
+@_errors_of("audible")
 def summary(study: Objectives) -> list[Row]:
     """Errors of modes 7..60 by objective and material."""
     return _pooled(study, "audible")
 
 
-@table(
-    lambda study: (
-        f"""Relative errors of the frequencies of modes {FIRST}–{study.last("all")} against
-        SLEPc on the fine mesh, modes matched by index, by objective and material: root mean
-        square over all solids and resolutions, each weighing the same, and the worst single
-        frequency, negative if too low. The smallest rms over all materials comes first."""
-    ),
-    lambda study: [
-        Column("coarsening", "Objective"),
-        *error_columns(study.part["materials"]),
-    ],
-)
+@_errors_of("all")
 def summary_all(study: Objectives) -> list[Row]:
     """Errors of all modes by objective and material."""
     return _pooled(study, "all")
