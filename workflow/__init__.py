@@ -1,3 +1,3 @@
-"""The Snakemake workflow: rules, configuration, schemas, scripts and the report."""
+"""The Snakemake workflow: rules, configuration, report, validation and cluster jobs."""
 
 import carillon
