@@ -13,12 +13,13 @@ import pytest
 from dataset_gen.objectives import DATASET_OBJECTIVES, SAMPLED
 from workflow.__main__ import main
 from workflow.commands.estimate import CONFIGURATIONS, load
-from workflow.estimate import work
-from workflow.estimate.measured import KEY, expected_seconds, load_measured, medians
-from workflow.estimate.plan import plan
-from workflow.estimate.summary import SUMMED, Machine, summarised, with_costs
+from workflow.estimate import costs
+from workflow.estimate.costs import load_medians, with_costs, with_work
+from workflow.estimate.jobs import plan
+from workflow.estimate.summary import SUMMED, summarised
 
-HERE = Machine(1, 2)
+HERE = (1, 2)
+"""Nodes and cores of each."""
 
 
 @pytest.fixture(scope="module")
@@ -36,16 +37,15 @@ def _planned(config, *cores):
     return plan(json.loads(config), *cores)
 
 
-def costed(config, machine=HERE, measured=None):
+def costed(config, machine=HERE, medians=None):
     """What every job takes; what is the same is planned only once, which takes seconds."""
-    jobs = _planned(json.dumps(config), machine.cores_per_node, machine.cores)
-    table = load_measured() if measured is None else measured
-    return with_costs(work.with_work(jobs, config), table)
+    nodes, cores = machine
+    jobs = _planned(json.dumps(config), cores, nodes * cores)
+    return with_costs(with_work(jobs, config), load_medians() if medians is None else medians)
 
 
-def values(config, machine=HERE, measured=None):
-    table = load_measured() if measured is None else measured
-    return summarised(costed(config, machine, table), table, machine)
+def values(config, machine=HERE, medians=None):
+    return summarised(costed(config, machine, medians), machine[0] * machine[1])
 
 
 def stages(config, machine=HERE):
@@ -78,12 +78,12 @@ def test_every_job_of_the_presets_is_measured(configs):
 
 
 def test_a_rule_that_was_not_measured_takes_its_limit_and_says_so(config):
-    measured = load_measured().drop("audit_spectra", level="kind")
+    medians = load_medians().drop("audit_spectra")
     config["resources"]["audit_spectra"] = {"memory_mb": 1234, "minutes": 7}
-    jobs = costed(config, HERE, measured)
-    audit = jobs[jobs["rule"] == "audit_spectra"]
+    jobs = costed(config, HERE, medians)
+    audit = jobs[jobs["kind"] == "audit_spectra"]
     assert set(audit["hours"]) == {7 / 60} and set(audit["memory_gb"]) == {1.234}
-    cautions = values(config, HERE, measured)["cautions"]
+    cautions = values(config, HERE, medians)["cautions"]
     assert any("audit_spectra: not measured; the 7 min" in caution for caution in cautions)
 
 
@@ -99,17 +99,15 @@ def test_the_sampled_evaluator_costs_as_much_more_as_it_is_slower(configs):
     config = copy.deepcopy(configs["paper"])
     closed = stages(config)["data generation"]["core_hours"]
     config["dataset"]["objective"] = SAMPLED
-    ratio = work.FIT_COSTS[SAMPLED] / work.FIT_COSTS["energy"]
+    ratio = costs.FIT_COSTS[SAMPLED] / costs.FIT_COSTS["energy"]
     assert stages(config)["data generation"]["core_hours"] == pytest.approx(
         ratio * closed, rel=0.01
     )
-    assert set(work.FIT_COSTS) == set(DATASET_OBJECTIVES)
+    assert set(costs.FIT_COSTS) == set(DATASET_OBJECTIVES)
 
 
 def test_more_cores_shorten_what_has_jobs_for_them(configs):
-    one, many = (
-        stages(configs["paper"], Machine(nodes, 4))["data generation"] for nodes in (1, 100)
-    )
+    one, many = (stages(configs["paper"], (nodes, 4))["data generation"] for nodes in (1, 100))
     assert many["core_hours"] == pytest.approx(one["core_hours"])
     assert one["wall_hours"] > 5.0 * many["wall_hours"]
     assert many["wall_hours"] >= many["longest_job_hours"]
@@ -131,31 +129,15 @@ def test_what_is_far_beyond_the_measurements_is_said(configs):
 def test_jobs_are_those_of_the_rules(configs, plan):
     file = CONFIGURATIONS / "tiny.yaml"
     jobs = plan("all", "figures", "--configfile", file)
-    counts = costed(configs["tiny"])["rule"].value_counts().to_dict()
+    rules = _planned(json.dumps(configs["tiny"]), 2, 2)["kind"].str.split(" ").str[0]
+    counts = rules.value_counts().to_dict()
     assert counts | {"all": 1, "figures": 1} == {n: jobs[n] for n in jobs if n != "total"}
 
 
 def test_an_absent_mesh_is_guessed_and_a_built_in_one_counted():
-    assert work.unknowns("nowhere.obj", 30) == work.TYPICAL * 30**3
-    assert work.unknowns("builtin:box", 8) == 3 * 9 * 7 * 5
-    assert work.unknowns("builtin:box", 48) == 8 * work.unknowns("builtin:box", 24)
-
-
-def test_medians_tell_the_median_job_and_how_far_off_others_are():
-    jobs = pd.DataFrame(
-        {
-            "kind": "solve",
-            "variant": "",
-            "work": [10.0, 20.0, 40.0],
-            "seconds": [2.5, 3.5, 11.0],
-            "content": 1.0,
-            "megabytes": 2.0,
-        }
-    )
-    table = medians(jobs)
-    assert table.loc[("solve", ""), ["jobs", "work", "seconds"]].tolist() == [3, 20.0, 3.5]
-    assert expected_seconds(jobs, table).tolist() == [2.5, 3.5, 5.5]
-    assert table["off"].item() == pytest.approx(2.0)
+    assert costs.unknowns("nowhere.obj", 30) == costs.TYPICAL * 30**3
+    assert costs.unknowns("builtin:box", 8) == 3 * 9 * 7 * 5
+    assert costs.unknowns("builtin:box", 48) == 8 * costs.unknowns("builtin:box", 24)
 
 
 def test_results_of_a_run_replace_what_comes_along(tmp_path):
@@ -165,12 +147,11 @@ def test_results_of_a_run_replace_what_comes_along(tmp_path):
     benchmark.write_text("s\th:m:s\tmax_rss\n501\t0:08:21\tNA\n")
     (tmp_path / "models/bar").mkdir(parents=True)
     (tmp_path / "models/bar/truth.h5").write_bytes(bytes(3000))
-    own, packaged = load_measured([tmp_path]), load_measured()
-    truth = own.loc[("find_modes", "truth")]
-    assert truth["seconds"] == 501.0 and truth["megabytes"] == 0.003 and truth["jobs"] == 1
-    others = own.index.drop(("find_modes", "truth"))
+    own, packaged = load_medians([tmp_path]), load_medians()
+    truth = own.loc["find_modes truth"]
+    assert truth["seconds"] == 501.0 and truth["megabytes"] == 0.003
+    others = own.index.drop("find_modes truth")
     pd.testing.assert_frame_equal(own.loc[others], packaged.loc[others], check_dtype=False)
-    assert set(own.index.names) == set(KEY)
 
 
 # Command line ------------------------------------------------------------------------------------

@@ -9,8 +9,7 @@ from tests.configuration_keys import every_key
 from workflow import settings
 from workflow.commands.estimate import CONFIGURATIONS, load
 from workflow.configuration.whole import limits
-from workflow.estimate.measured import START, load_measured
-from workflow.estimate.work import FIT_COSTS
+from workflow.estimate.costs import FIT_COSTS, START, load_medians
 
 PRESETS = ("tiny", "laptop", "cluster", "paper")
 
@@ -60,7 +59,7 @@ def test_the_papers_counts():
 def test_a_shard_of_the_papers_data_is_about_an_hour():
     dataset = preset("paper")["dataset"]
     fits = FIT_COSTS[dataset["objective"]] * dataset["samples"] / dataset["shards"]
-    drawn = load_measured().loc[("generate_shard", "")]
+    drawn = load_medians().loc["generate_shard"]
     hours = fits * (drawn["seconds"] - START) / drawn["work"] / 3600.0
     assert 0.5 < hours < 2.0
 

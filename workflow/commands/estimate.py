@@ -7,17 +7,14 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
-import pandas as pd
-
 from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import between
 from carillon.processes.threads import allowed_cores
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from workflow import settings
-from workflow.estimate.measured import load_measured
-from workflow.estimate.plan import plan
-from workflow.estimate.summary import Machine, as_text, summarised, with_costs
-from workflow.estimate.work import with_work
+from workflow.estimate.costs import load_medians, with_costs, with_work
+from workflow.estimate.jobs import plan
+from workflow.estimate.summary import as_text, summarised
 
 CONFIGURATIONS = Path(__file__).parent.parent / "config"
 DEFAULT_PRESET = "laptop"
@@ -73,13 +70,19 @@ def run(arguments: argparse.Namespace) -> int:
     """
     preset = CONFIGURATIONS / f"{arguments.preset or DEFAULT_PRESET}.yaml"
     path = preset if arguments.configfile is None else Path(arguments.configfile)
+    default = CONFIGURATIONS / f"{DEFAULT_PRESET}.yaml"
     config = load(path, arguments.objective)
-    machine = Machine(arguments.nodes, arguments.cores_per_node)
-    run_name = "make run" if path == CONFIGURATIONS / f"{DEFAULT_PRESET}.yaml" else "target all"
+    nodes, cores = arguments.nodes, arguments.cores_per_node
+    medians = load_medians(arguments.results)
+    jobs = with_costs(with_work(plan(config, cores, nodes * cores), config), medians)
     result = {
         "configuration": str(path),
-        "run_name": run_name,
-        **estimate(config, machine, load_measured(arguments.results)),
+        "run_name": "make run"
+        if path == CONFIGURATIONS / f"{DEFAULT_PRESET}.yaml"
+        else "target all",
+        "machine": {"nodes": nodes, "cores_per_node": cores},
+        **summarised(jobs, nodes * cores),
+        "measured": medians[medians.index.isin(jobs["kind"])].reset_index().to_dict("records"),
     }
     title = f"{path.stem}, objective {config['dataset']['objective']},"
     print(json.dumps(result, indent=2) if arguments.json else as_text(result, title))
@@ -95,15 +98,3 @@ def load(path: Path, objective: str | None = None) -> dict[str, Any]:
         If it cannot be read, or holds anything that does not fit.
     """
     return settings.complete([path], {"dataset": {"objective": objective}} if objective else {})
-
-
-def estimate(config: dict[str, Any], machine: Machine, measured: pd.DataFrame) -> dict[str, Any]:
-    """What the jobs of a configuration take, see `summarised`.
-
-    Raises
-    ------
-    UserError
-        If a mesh cannot be read, or the rules do not accept the configuration.
-    """
-    jobs = with_work(plan(config, machine.cores_per_node, machine.cores), config)
-    return summarised(with_costs(jobs, measured), measured, machine)

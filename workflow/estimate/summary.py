@@ -1,131 +1,92 @@
-"""What the jobs of a configuration take: by stage, in all, and how far off it may be."""
+"""What the jobs of a configuration take: by stage, and in all."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
-from workflow.estimate.measured import KEY, expected_megabytes, expected_seconds
-from workflow.estimate.plan import TARGETS
-from workflow.estimate.work import STAGES
-
-OTHER_SECONDS = 4.0
-"""Time of a job without a benchmark file, such as one that draws a picture [s]."""
+from workflow.estimate.costs import STAGES
+from workflow.estimate.jobs import TARGETS
 
 FAR = 5.0
 """Multiple of the measured work from which on an estimate is said to be far beyond it."""
-
 SUMMED = ["jobs", "core_hours", "wall_hours", "kept_gb"]
 HEADER = f"{'stage':<25}  jobs  core-hours  wall time    memory     files"
 RECKONED = """\
-figures belong to target figures, all else to {run_name}
+figures belong to target figures, all else to {}
 core-hours are of the cores that jobs occupy: what the median job of earlier runs took, scaled by
 the size of solids and data, times the jobs of Snakemake's dry run; in all this may be off by a
-factor of three, and single jobs of those runs were by one of {off:.0f}, where they compiled kernels
+factor of three, single jobs by more
 memory is the most that the largest job may take (resources), not what it takes; files stay, and
 data take as much again in journals while they are drawn"""
 
 
-class Machine(NamedTuple):
-    """Equal nodes."""
+def summarised(jobs: pd.DataFrame, cores: int) -> dict[str, Any]:
+    """The jobs of `with_costs` by stage on so many cores, with totals of the default run and all.
 
-    nodes: int
-    cores_per_node: int
-
-    @property
-    def cores(self) -> int:
-        """All cores."""
-        return self.nodes * self.cores_per_node
-
-
-def with_costs(jobs: pd.DataFrame, measured: pd.DataFrame) -> pd.DataFrame:
-    """The jobs of `with_work` with `known`, `core_hours`, `hours`, `memory_gb` and `kept_gb`.
-
-    A job that is not known takes a few seconds, or the limit of its rule if that has one.
+    Figures are a stage by themselves; the rules of a stage run one after the other.
     """
-    seconds = expected_seconds(jobs, measured)
-    limits = (60.0 * jobs["minutes"].astype(float)).fillna(OTHER_SECONDS)
-    hours = seconds.fillna(limits) / 3600.0
-    return jobs.assign(
-        known=seconds.notna() | jobs["minutes"].isna(),
-        hours=hours,
-        core_hours=hours * jobs["cores"],
-        memory_gb=jobs["memory_mb"].astype(float).fillna(0.0) / 1000.0,
-        kept_gb=expected_megabytes(jobs, measured).fillna(0.0) / 1000.0,
-    )
-
-
-def summarised(jobs: pd.DataFrame, measured: pd.DataFrame, machine: Machine) -> dict[str, Any]:
-    """The jobs of `with_costs` by stage, with totals of the default run and of all."""
     stages = jobs["stage"].where(jobs["target"] == TARGETS[0], TARGETS[1])
-    order = [*STAGES, TARGETS[1]]
-    by_stage = sorted(jobs.groupby(stages), key=lambda each: order.index(each[0]))
-    rows = pd.DataFrame([{"stage": name, **_row(same, machine)} for name, same in by_stage])
-    used = measured[measured.index.isin(pd.MultiIndex.from_frame(jobs[KEY]))]
+    rows = []
+    for stage in (*STAGES, TARGETS[1]):
+        same = jobs[stages == stage]
+        rules = same.groupby(same["kind"].str.split(" ").str[0])
+        if len(same):
+            row = {
+                "stage": stage,
+                "target": same["target"].iloc[0],
+                "jobs": len(same),
+                "core_hours": same["core_hours"].sum(),
+                "wall_hours": sum(
+                    max(each["hours"].max(), each["core_hours"].sum() / cores) for _, each in rules
+                ),
+                "longest_job_hours": same["hours"].max(),
+                "memory_gb": same["memory_gb"].max(),
+                "kept_gb": same["kept_gb"].sum(),
+            }
+            rows.append(row)
     return {
-        "machine": machine._asdict(),
-        "stages": rows.to_dict("records"),
+        "stages": rows,
         "totals": _totals(rows),
-        "run_totals": _totals(rows[rows["target"] == TARGETS[0]]),
-        "cautions": list(_cautions(jobs, measured)),
-        "measured": used.reset_index().to_dict("records"),
-        "off": used["off"].max(),
+        "run_totals": _totals([row for row in rows if row["target"] == TARGETS[0]]),
+        "cautions": list(_cautions(jobs)),
     }
 
 
-def _row(jobs: pd.DataFrame, machine: Machine) -> dict[str, Any]:
-    """What the jobs of a stage take together; its rules run one after the other."""
-    rules = jobs.groupby("rule")
-    return {
-        "target": jobs["target"].iloc[0],
-        "jobs": len(jobs),
-        "core_hours": jobs["core_hours"].sum(),
-        "wall_hours": sum(
-            max(same["hours"].max(), same["core_hours"].sum() / machine.cores) for _, same in rules
-        ),
-        "longest_job_hours": jobs["hours"].max(),
-        "memory_gb": jobs["memory_gb"].max(),
-        "kept_gb": jobs["kept_gb"].sum(),
-    }
+def _totals(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    sums = {name: sum(row[name] for row in rows) for name in SUMMED}
+    return sums | {"memory_gb": max(row["memory_gb"] for row in rows)}
 
 
-def _totals(rows: pd.DataFrame) -> dict[str, Any]:
-    return {name: rows[name].sum().item() for name in SUMMED} | {
-        "memory_gb": rows["memory_gb"].max()
-    }
-
-
-def _cautions(jobs: pd.DataFrame, measured: pd.DataFrame) -> Iterator[str]:
+def _cautions(jobs: pd.DataFrame) -> Iterator[str]:
     """What is not measured, or far beyond what is."""
-    for rule, same in jobs[~jobs["known"]].groupby("rule"):
-        minutes = same["minutes"].max()
+    for kind, same in jobs[~jobs["known"]].groupby("kind"):
         yield (
-            f"{rule}: not measured; the {minutes:g} min that each of its jobs may take are "
-            "counted, an upper bound"
+            f"{kind}: not measured; the {same['minutes'].max():g} min that each of its jobs may "
+            "take are counted, an upper bound"
         )
-    times = jobs["work"] / jobs.join(measured["work"], on=KEY, rsuffix="_measured")["work_measured"]
-    for stage, most in times.groupby(jobs["stage"]).max().items():
+    for stage, most in jobs.groupby("stage")["times"].max().items():
         if most > FAR:
             yield f"{stage}: the largest job is {most:,.0f} times the work that was measured"
 
 
 def as_text(result: Mapping[str, Any], title: str) -> str:
-    """The result of `summarised` as lines."""
+    """The result of the command as lines."""
     nodes, cores = result["machine"].values()
     run_name = result["run_name"]
     rows = [row for row in result["stages"] if row["target"] == TARGETS[0]]
+    figures = result["stages"][len(rows) :]
     rows.append({**result["run_totals"], "stage": f"total of {run_name}"})
-    further = [row for row in result["stages"] if row["target"] != TARGETS[0]]
-    if further:
-        rows += [*further, {**result["totals"], "stage": "total with figures"}]
+    if figures:
+        rows += [*figures, {**result["totals"], "stage": "total with figures"}]
     return "\n".join(
         [
             f"{title} on {nodes} x {cores} = {nodes * cores:,} cores, nothing done yet",
             HEADER,
             *map(_line, rows),
-            RECKONED.format(run_name=run_name, off=result["off"]),
+            RECKONED.format(run_name),
             *(f"note: {caution}" for caution in result["cautions"]),
         ]
     )

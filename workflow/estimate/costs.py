@@ -1,11 +1,11 @@
-"""How much work a job is, by one plain law a rule."""
+"""What jobs take: medians of earlier runs, scaled by one plain law a kind of jobs."""
 
 from __future__ import annotations
 
 import math
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,17 +15,23 @@ import pandas as pd
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+from carillon.processes.threads import allowed_cores
 from workflow import settings
+from workflow.estimate.jobs import RESULTS, plan
 
+PACKAGED = Path(__file__).with_name("measured.csv")
+"""Medians of a run with the preset `laptop` and one with `tiny`, on two cores of an AMD EPYC, and
+for `generate_shard` one shard of 400,000 samples, since the runs' own do little but start."""
+START = 1.5
+"""Time that a job of any kind takes to start [s]."""
+OTHER_SECONDS = 4.0
+"""Time of a job without a benchmark file, such as one that draws a picture [s]."""
 ORIGINS = 8
 """Rows of a sample, one for each corner of its block."""
-
 TYPICAL = 0.8
 """Unknowns of a compact solid over the cube of its resolution, for a mesh that is absent."""
-
 COUNTED = 24
 """Resolution up to which voxels are counted; beyond, their number grows with its cube."""
-
 FIT_COSTS = {
     "energy": 12.6,
     "chen2015": 1.76,
@@ -40,7 +46,7 @@ FIT_COSTS = {
 
 
 class Law(NamedTuple):
-    """Stage of a rule's jobs, and how their time and their files grow.
+    """Stage of a kind of jobs, and how their time and their files grow.
 
     Parameters
     ----------
@@ -57,7 +63,7 @@ class Law(NamedTuple):
     shared: bool = False
 
 
-OTHERS = "tables, pictures, report"
+_OTHERS = Law("tables, pictures, report")
 _VARIANTS = "HCMS and other variants"
 _SOLVE = {"unknowns": 1.2, "modes": 0.6}
 _READ = {"unknowns": 1.0, "modes": 0.6}
@@ -71,29 +77,22 @@ LAWS = {
     "follow_convergence": Law(_VARIANTS, _SOLVE | {"steps": 0.8}),
     "time_methods": Law(_VARIANTS, _SOLVE | {"runs": 1.0, "tune": 1.0}),
     "measure_scaling": Law(_VARIANTS, _SOLVE | {"ranks": 1.0, "weak": 1.0}),
-    "compare_with_truth": Law(OTHERS, _READ),
+    "compare_with_truth": Law(_OTHERS.stage, _READ),
     "audit_spectra": Law("validation", _READ),
     "strike_solid": Law("validation", _READ, {"unknowns": 0.5}),
     "validate_model": Law("validation"),
 }
-"""Laws by rule, or by rule and variant."""
-
+"""Laws by kind, or by rule for all variants; jobs of any other take the same time at any size."""
 STAGES = list(dict.fromkeys(law.stage for law in LAWS.values()))
 
 
-def law_of(kind: str, variant: str = "") -> Law:
-    """The law of a kind of jobs; those of any other take the same time whatever their sizes."""
-    return LAWS.get(f"{kind} {variant}", LAWS.get(kind, Law(OTHERS)))
-
-
 def with_work(jobs: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
-    """The jobs of `plan` with their kind, their stage and the sizes that time and files go by.
+    """The jobs of `plan` with their `stage`, and what their time and their files grow with.
 
-    Columns added are `kind`, the rule that such jobs are measured by; `stage`; `work` and
-    `content`, without a unit, in proportion to which time and files grow.
+    `work` and `content` have no unit; `kind` is that of a rule that others are made from.
     """
-    kinds = jobs["rule"].str.replace("_(in_full|of_run)$", "", regex=True)
-    laws = list(map(law_of, kinds, jobs["variant"]))
+    kinds = jobs["kind"].str.replace("_(in_full|of_run)$", "", regex=True)
+    laws = [LAWS.get(kind, LAWS.get(kind.split(" ")[0], _OTHERS)) for kind in kinds]
     sizes = [_sizes(job, config) for job in jobs.itertuples()]
     shares = [cores if law.shared else 1 for law, cores in zip(laws, jobs["cores"])]
     return jobs.assign(
@@ -102,6 +101,71 @@ def with_work(jobs: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
         work=[_product(law.time, each) / n for law, each, n in zip(laws, sizes, shares)],
         content=[_product(law.files, each) for law, each in zip(laws, sizes)],
     )
+
+
+def load_medians(folders: Iterable[str | Path] = ()) -> pd.DataFrame:
+    """Medians by kind of `work` and its `seconds`, of `content` and the `megabytes` of its files.
+
+    Those of former results in `folders` replace the packaged ones.
+
+    Raises
+    ------
+    UserError
+        If a folder holds no results of a run.
+    """
+    packaged = pd.read_csv(PACKAGED, index_col="kind")
+    own = [_finished_jobs(Path(folder)) for folder in folders]
+    if not own:
+        return packaged
+    medians = pd.concat(own).groupby("kind")[list(packaged)].median()
+    return medians.combine_first(packaged)[list(packaged)]
+
+
+def with_costs(jobs: pd.DataFrame, medians: pd.DataFrame) -> pd.DataFrame:
+    """The jobs of `with_work` with `known`, `core_hours`, `hours`, `memory_gb`, `kept_gb`.
+
+    `times` is their work over that of the median. A job that is not known takes a few seconds, or
+    the limit of its rule if that has one.
+    """
+    of_kind = medians.reindex(jobs["kind"]).set_index(jobs.index)
+    times = jobs["work"] / of_kind["work"]
+    seconds = START + (of_kind["seconds"] - START).clip(lower=0.0) * times
+    limits = (60.0 * jobs["minutes"].astype(float)).fillna(OTHER_SECONDS)
+    hours = seconds.fillna(limits) / 3600.0
+    megabytes = of_kind["megabytes"] * jobs["content"] / of_kind["content"]
+    return jobs.assign(
+        known=seconds.notna() | jobs["minutes"].isna(),
+        times=times,
+        hours=hours,
+        core_hours=hours * jobs["cores"],
+        memory_gb=jobs["memory_mb"].astype(float).fillna(0.0) / 1000.0,
+        kept_gb=megabytes.fillna(0.0) / 1000.0,
+    )
+
+
+def _finished_jobs(folder: Path) -> pd.DataFrame:
+    """The jobs of a run with benchmark files in its folder of results, and what they took."""
+
+    def below(name: str) -> Path:
+        return folder / Path(name).relative_to(RESULTS)
+
+    config = settings.complete([folder / "config.yaml"])
+    jobs = with_work(plan(config, allowed_cores()), config)
+    jobs = jobs[[bool(name) and below(name).is_file() for name in jobs["benchmark"]]]
+    if jobs.empty:
+        raise UserError(f"{folder}: holds no benchmark files, expected results of a run")
+    files = [[file for file in map(below, names) if file.is_file()] for names in jobs["outputs"]]
+    return jobs.assign(
+        seconds=[_seconds(below(name)) for name in jobs["benchmark"]],
+        megabytes=[sum(file.stat().st_size for file in each) / 1e6 for each in files],
+    )
+
+
+def _seconds(file: Path) -> float:
+    try:
+        return float(pd.read_csv(file, sep="\t", nrows=1)["s"].iloc[0])
+    except (ValueError, LookupError, OSError):
+        raise UserError(f"{file}: expected a benchmark file of Snakemake") from None
 
 
 def _product(powers: Mapping[str, float], sizes: Mapping[str, float]) -> float:
@@ -121,11 +185,12 @@ def _sizes(job: Any, config: Mapping[str, Any]) -> dict[str, float]:
         sizes["modes"] = float(model["modes"] or config["solver"]["modes"])
     dataset = config["dataset"]
     samples = float(dataset["samples"])
-    sizes["samples"] = samples / dataset["shards"]
-    sizes["fits"] = sizes["samples"] * FIT_COSTS[dataset["objective"]]
     rows = ORIGINS * samples * len(dataset["distributions"])
-    sizes["rows"] = min(rows, float(config["forests"]["structure_rows"]))
-    return sizes
+    return sizes | {
+        "samples": samples / dataset["shards"],
+        "fits": samples / dataset["shards"] * FIT_COSTS[dataset["objective"]],
+        "rows": min(rows, float(config["forests"]["structure_rows"])),
+    }
 
 
 def option_sizes(command: str) -> dict[str, float]:
@@ -136,16 +201,13 @@ def option_sizes(command: str) -> dict[str, float]:
     >>> option_sizes("python -m solver scaling --modes 8 --ranks 1,2 --weak > log")
     {'modes': 8.0, 'ranks': 2.0, 'weak': 2.0}
     """
-    options = re.findall(r" --([a-z-]+)(?: ([^\s>-]\S*))?", command)
-    return {name: _number(value) for name, value in options}
-
-
-def _number(value: str) -> float:
-    """An option's number, the length of its list, or 2 if it stands alone."""
-    try:
-        return max(1.0, float(value))
-    except ValueError:
-        return 1.0 + value.count(",") if value else 2.0
+    sizes = {}
+    for name, value in re.findall(r" --([a-z-]+)(?: ([^\s>-]\S*))?", command):
+        try:
+            sizes[name] = max(1.0, float(value))
+        except ValueError:
+            sizes[name] = 1.0 + value.count(",") if value else 2.0
+    return sizes
 
 
 @cache

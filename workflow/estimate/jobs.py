@@ -22,16 +22,15 @@ from workflow import settings, solids
 
 RESULTS = "results"
 """Folder of results of a planned run."""
-
 TARGETS = ("all", "figures")
 """Targets of Snakemake that are estimated; what both need belongs to the first."""
 
 
 def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = None) -> pd.DataFrame:
-    """Jobs of a complete configuration in an order in which they can run; meshes may be absent.
+    """Jobs of a complete configuration, whose meshes may be absent.
 
-    Columns are `rule`, `variant` (of a model's modes, or empty), `model` (or empty) and `target`;
-    `cores`; `memory_mb` and `minutes`, the limits if there are any; `command` (of a shell, or
+    Columns are `kind`, the rule, with the variant of a model's modes; `model` (or empty), `target`
+    and `cores`; `memory_mb` and `minutes`, the limits if there are any; `command` (of a shell, or
     empty); `outputs` and `benchmark`, its files below the folder `results`.
 
     Parameters
@@ -46,39 +45,34 @@ def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = Non
     UserError
         If the rules do not accept the configuration.
     """
+    values = copy.deepcopy(dict(config)) | {"results_dir": RESULTS, "baseline": None}
+    cores = cores or cores_per_node
+    if cores > cores_per_node:
+        values["solver"]["cores"] = config["solver"]["cores"] or cores_per_node
+    meshes: dict[str, str] = {}
     with TemporaryDirectory() as folder:
-        values, meshes = _placeless(config, Path(folder))
-        if cores is not None and cores > cores_per_node:
-            values["solver"]["cores"] = config["solver"]["cores"] or cores_per_node
+        for part in (values, *(values[section] for section in solids.studied(values))):
+            for model in part["models"].values():
+                # Of a material from a file is only known that it varies.
+                if "material" in model and model["material"] not in MATERIALS:
+                    model["material"] = "smooth"
+                if not model["mesh"].startswith(settings.BUILTIN_PREFIX):
+                    empty = f"{folder}/mesh-{len(meshes)}.obj"
+                    meshes[empty] = settings.located(config, model["mesh"])
+                    model["mesh"] = empty
+        forests = f"{folder}/forests.h5"
+        if values["forests"]["model"]:
+            values["forests"]["model"] = forests
+        for path in (forests, *meshes):
+            Path(path).touch()
         file = Path(folder, "config.json")
         file.write_text(json.dumps(values))
         # Snakemake alters the process that it runs in; a fork has loaded most of it already.
         with ProcessPoolExecutor(1, mp_context=get_context("fork")) as process:
-            jobs = pd.DataFrame(process.submit(_planned, file, cores or cores_per_node).result())
-    for place, mesh in meshes.items():
-        jobs["command"] = jobs["command"].str.replace(place, shlex.quote(mesh), regex=False)
+            jobs = pd.DataFrame(process.submit(_planned, file, cores).result())
+    for empty, mesh in meshes.items():
+        jobs["command"] = jobs["command"].str.replace(empty, shlex.quote(mesh), regex=False)
     return jobs
-
-
-def _placeless(config: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """The same configuration on files that are there, with the meshes by what stands for them."""
-    values = copy.deepcopy(dict(config)) | {"results_dir": RESULTS, "baseline": None}
-    meshes: dict[str, str] = {}
-    for part in (values, *(values[section] for section in solids.studied(values))):
-        for model in part["models"].values():
-            # Of a material from a file is only known that it varies.
-            if "material" in model and model["material"] not in MATERIALS:
-                model["material"] = "smooth"
-            if not model["mesh"].startswith(settings.BUILTIN_PREFIX):
-                place = str(folder / f"mesh-{len(meshes)}.obj")
-                meshes[place] = settings.located(config, model["mesh"])
-                model["mesh"] = place
-    forests = str(folder / "forests.h5")
-    if values["forests"]["model"]:
-        values["forests"]["model"] = forests
-    for file in (forests, *meshes):
-        Path(file).touch()
-    return values, meshes
 
 
 def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
@@ -103,8 +97,7 @@ def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
         needed = set(dag.bfs(dag.dependencies, *main))
         return [
             {
-                "rule": job.rule.name,
-                "variant": job.wildcards_dict.get("variant", ""),
+                "kind": f"{job.rule.name} {job.wildcards_dict.get('variant', '')}".strip(),
                 "model": job.wildcards_dict.get("model", ""),
                 "target": TARGETS[job not in needed],
                 "cores": job.threads,
@@ -114,7 +107,6 @@ def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
                 "outputs": list(map(str, job.output)),
                 "benchmark": str(job.benchmark or ""),
             }
-            for level in dag.toposorted()
-            for job in sorted(level, key=lambda job: (job.rule.name, list(job.output)))
+            for job in sorted(dag.jobs, key=lambda job: (job.rule.name, list(job.output)))
             if job.output
         ]
