@@ -56,7 +56,7 @@ class Studio(Protocol):
         """Send nothing more to a feed, whose page is gone."""
 
     async def call(self, name: str, arguments: Mapping[str, Any]) -> None:
-        """Do what the page asks for; names and keys of arguments are checked, values are not."""
+        """Do what the page asks for; neither the name nor the arguments are checked yet."""
 
     async def take_mesh(self, name: str, content: bytes) -> str:
         """Take up an uploaded mesh; its identifier. `name` is a plain file name."""

@@ -23,6 +23,7 @@ from sound.project.project import Project
 from studio.binary import pack
 from studio.feed import Feed
 from studio.interface import Download, NotFoundError
+from studio.session.handlers import require_call
 
 SIDES = {"targets", "mesh"}
 STEP_SECONDS = 0.2
@@ -178,6 +179,7 @@ class StubStudio:
                 feed.put(self.bank(), newest="bank")
 
     async def call(self, name: str, arguments: Mapping[str, Any]) -> None:
+        require_call(name, arguments)
         self.calls.append((name, dict(arguments)))
         if name == "add_target":
             vertex = arguments["vertex"]

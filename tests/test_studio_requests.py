@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from studio.server.calls import CALLS
 from studio.server.page_files import PAGE, page_table
 from studio.server.uploads import Limits, plain_name
+from studio.session.handlers import HANDLERS
 from tests.patience import wait_for
 from tests.studio_server import SECONDS, Served, next_event, reply_of, served
 
@@ -418,4 +418,4 @@ def test_every_call_of_the_protocol_is_known_and_no_other():
     text = (Path(__file__).parent.parent / "docs/contributing/studio.md").read_text()
     table = text.partition("| call | with |")[2].partition("\n\n")[0]
     named = re.findall(r"`(\w+)`", "\n".join(line.split("|")[1] for line in table.splitlines()[2:]))
-    assert sorted(named) == sorted(CALLS)
+    assert sorted(named) == sorted(HANDLERS)

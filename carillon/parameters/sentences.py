@@ -127,7 +127,8 @@ def no_key(name: str, known: list[str]) -> str:
     """Reason for refusing a key that is not among the known ones."""
     suggestion = alike(name, known)
     hint = f"; did you mean {suggestion}?" if suggestion else ""
-    return f"there is no key {name!r}, only {', '.join(known)}{hint}"
+    only = f", only {', '.join(known)}" if known else ""
+    return f"there is no key {name!r:.100}{only}{hint}"
 
 
 def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
@@ -152,4 +153,4 @@ def _limit(value: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    return repr(list(value) if isinstance(value, tuple) else value)
+    return f"{list(value) if isinstance(value, tuple) else value!r:.200}"

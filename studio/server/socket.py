@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import traceback
-from typing import Any
+from typing import Any, NoReturn
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -12,8 +13,9 @@ from carillon.command_line import exit_status
 from carillon.errors import UserError
 from studio.feed import Feed
 from studio.interface import Studio
-from studio.server.calls import LARGEST, read_call, read_message
 
+LARGEST = 2**53
+"""Largest number of a call; browsers do not tell larger whole numbers apart."""
 MOST_CALLS = 32
 """Most calls of a page that are under way at a time; more wait."""
 OWN_FAULT = "the studio itself failed at this; what it printed says why"
@@ -72,18 +74,31 @@ async def _serve(text: str | None, studio: Studio, feed: Feed) -> None:
     try:
         if text is None:
             raise UserError("the message is binary; expected JSON as text")
-        message = read_message(text)
-        number = _number(message)
-        name, arguments = read_call(message)
-        await studio.call(name, arguments)
+        message = _message(text)
+        number = _number(message.pop("id", None))
+        await studio.call(str(message.pop("do", None)), message)
     except Exception as error:
         feed.send({"reply": number, "error": sentence_of(error)})
     else:
         feed.send({"reply": number})
 
 
-def _number(message: dict[str, Any]) -> int:
-    number = message.get("id")
+def _message(text: str) -> dict[str, Any]:
+    try:
+        message = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        said = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise UserError(f"the message is no JSON ({said}); expected an object") from None
+    if not isinstance(message, dict):
+        raise UserError('the message is no object; expected {"id": 1, "do": "..."}')
+    return message
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"found {name}")
+
+
+def _number(number: Any) -> int:
     if isinstance(number, bool) or not isinstance(number, int) or abs(number) > LARGEST:
         raise UserError(f"id is {number!r:.100}, expected a whole number")
     return number

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import make_dataclass, replace
+from functools import cache
+from typing import Annotated, Any, TypedDict, Unpack, get_args, get_type_hints
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import surface_name
 from carillon.parameters.documents import require_values
+from carillon.parameters.model import Within
 from sound.project.project import Project
 from studio.interface import NotFoundError
 from studio.session import designs
@@ -18,8 +21,22 @@ from studio.session.examples import EXAMPLES
 from studio.session.projects import fit_name, opened
 from studio.session.state import StudioState
 
+Text = Annotated[str, Within(max_length=1000)]
+Vertex = Annotated[int, Within(ge=0), "a vertex of the surface"]
 
-def open_mesh(state: StudioState, mesh: str, unit: float = 1.0) -> None:
+
+class TargetChanges(TypedDict, total=False):
+    """Keys of a target that pages change."""
+
+    vertex: Vertex
+    name: Text
+    clip: Text | None
+    modes: int | None
+    allow_clipped: bool
+    without: Annotated[tuple[float, ...], Within(max_length=1000)]
+
+
+def open_mesh(state: StudioState, mesh: Text, unit: float = 1.0) -> None:
     """Begin with a mesh: `builtin:NAME`, or one that was uploaded."""
     file = mesh if mesh.startswith(BUILTIN_PREFIX) else state.meshes.get(mesh)
     if file is None:
@@ -30,7 +47,7 @@ def open_mesh(state: StudioState, mesh: str, unit: float = 1.0) -> None:
     state.open(fit_name(surface_name(file)), Document(settings))
 
 
-def open_project(state: StudioState, project: str) -> None:
+def open_project(state: StudioState, project: Text) -> None:
     """Begin with an example (`e1`) or a project of the workspace (`p1`)."""
     kind, number = project[:1], project[1:]
     workspace = state.workspace
@@ -48,7 +65,7 @@ def open_project(state: StudioState, project: str) -> None:
 
 
 def add_target(
-    state: StudioState, vertex: int, name: str | None = None, clip: str | None = None
+    state: StudioState, vertex: Vertex, name: Text | None = None, clip: Text | None = None
 ) -> None:
     """Place a target on a vertex of the surface."""
     document = state.document
@@ -59,7 +76,7 @@ def add_target(
     state.do(f"add target {named}", changed)
 
 
-def change_target(state: StudioState, target: str, **changes: Any) -> None:
+def change_target(state: StudioState, target: Text, **changes: Unpack[TargetChanges]) -> None:
     """Change keys of a target."""
     document = state.document
     before = document.target(target)
@@ -69,20 +86,20 @@ def change_target(state: StudioState, target: str, **changes: Any) -> None:
             changes.setdefault("without", ())
     if changes.get("vertex") is not None:
         _require_free(state, changes["vertex"], target)
-        changes["at"] = None
+        before = replace(before, at=None)
     if "without" in changes:
         changes["without"] = tuple(changes["without"])
     changed = document.with_target(target, replace(before, **changes))
     state.do(f"change target {target}", changed)
 
 
-def remove_target(state: StudioState, target: str) -> None:
+def remove_target(state: StudioState, target: Text) -> None:
     """Remove a target."""
     changed = state.document.with_target(target, None)
     state.do(f"remove target {target}", changed)
 
 
-def change_settings(state: StudioState, settings: Mapping[str, Any]) -> None:
+def change_settings(state: StudioState, settings: dict[str, Any]) -> None:
     """Change keys of the project but its targets."""
     require_values(settings, Project, leave_out=("mesh", "targets"))
     if settings.get("forest") is not None:
@@ -150,7 +167,7 @@ HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
     "keep": keep,
     "swap": swap,
 }
-"""Functions of a state and the call's keys, by the name of the call in `studio.server.calls`."""
+"""What the page may call: functions of a state and of the call's keys, by the call's name."""
 
 
 async def handle(state: StudioState, name: str, arguments: Mapping[str, Any]) -> None:
@@ -159,11 +176,47 @@ async def handle(state: StudioState, name: str, arguments: Mapping[str, Any]) ->
     Raises
     ------
     UserError
-        If that cannot be done, with one sentence.
+        If there is no such call, its keys or their values are not those that the function takes
+        (see `require_call`), or what is asked for cannot be done; with one sentence.
     """
+    require_call(name, arguments)
     under_way = HANDLERS[name](state, **arguments)
     if under_way is not None:
         await under_way
+
+
+def require_call(name: str, arguments: Mapping[str, Any]) -> None:
+    """Check the name of a call, and its keys against the signature of its function.
+
+    Raises
+    ------
+    UserError
+        If there is no such call, a key is missing or unknown, or a value is of another kind.
+    """
+    if name not in HANDLERS:
+        raise UserError(f"there is no call {name!r:.100}; expected one of {', '.join(HANDLERS)}")
+    model, needed = _keys(HANDLERS[name])
+    for key in needed:
+        if key not in arguments:
+            raise UserError(f"{name}: lacks {key!r}")
+    try:
+        require_values(arguments, model)
+    except UserError as error:
+        raise UserError(f"{name}: {error}") from None
+
+
+@cache
+def _keys(handler: Callable[..., Any]) -> tuple[type, list[str]]:
+    """A call's keys as the fields of a dataclass, and those of them that have to be there."""
+    _, *parameters = inspect.signature(handler, eval_str=True).parameters.values()
+    known: dict[str, Any] = {}
+    for each in parameters:
+        if each.kind is each.VAR_KEYWORD:
+            known |= get_type_hints(get_args(each.annotation)[0], include_extras=True)
+        else:
+            known[each.name] = each.annotation
+    needed = [each.name for each in parameters if each.default is each.empty]
+    return make_dataclass("Keys", known.items()), [name for name in needed if name in known]
 
 
 def _file(state: StudioState, clip: str | None) -> str | None:
