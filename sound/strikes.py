@@ -8,8 +8,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from solver.response.vertices import inward_normals
@@ -18,7 +18,6 @@ from sound.surface import longest_side
 if TYPE_CHECKING:  # Its import takes long, and most of the room needs no surface.
     import trimesh
 
-Array = NDArray[np.float64]
 
 OFF_SURFACE = 1e-3
 """Distance from the surface, over the surface's longest side, from which it is told that a point is

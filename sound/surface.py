@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
+
 if TYPE_CHECKING:  # Its import takes long, and most of the room needs no surface.
     import trimesh
 
-Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 LONGEST_EDGE = 1.0 / 16.0

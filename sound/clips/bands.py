@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from carillon.arrays import Array, Complex
 
 _STOP_DECIBELS = 80.0
 """Attenuation of the filter outside of a band [dB]."""

@@ -9,15 +9,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.files.cache import remembered
 from carillon.files.datasets import number, read, refused
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
 from sound.clips.extraction import ModalSound
-
-Array = NDArray[np.float64]
 
 _KIND, _SCHEMA = "clip", 1
 _MODES = ("frequencies", "dampings", "amplitudes", "phases")

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Complex
 from carillon.command_line.progress import track
 from sound.clips.bands import Band, bands
 from sound.clips.esprit import esprit
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 BAND_SAMPLES = 512
 """Greatest number of samples of a band, from the strike on; those of a narrow band last longer."""

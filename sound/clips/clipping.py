@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.clips.free_vibration import FreeModes, free_modes
 from sound.clips.mode_search import SETTLING_STEPS
 from sound.clips.significance import settled
 from sound.synthesis.sinusoids import superposed
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FULL_SCALE = 0.9999

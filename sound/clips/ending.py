@@ -7,9 +7,8 @@ editor ends in silence, which no sum of damped sinusoids does.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 _SILENT = 1e-6
 """Greatest magnitude of added silence, over the clip's largest."""

@@ -6,9 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+from carillon.arrays import Complex
 
 MOST = 40
 """Greatest number of exponents of one signal."""

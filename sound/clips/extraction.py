@@ -15,8 +15,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.processes.threads import blas_threads
 from sound.bounds import require_level
@@ -29,8 +29,6 @@ from sound.clips.mode_search import FEWEST_PERIODS, has_periods, is_mode
 from sound.clips.onset import second_strike, strike_sample
 from sound.clips.significance import Fit
 from sound.synthesis.sinusoids import damped_sinusoids, superposed
-
-Array = NDArray[np.float64]
 
 LONGEST_SECONDS = 6.0
 """Length of the part after the strike that is searched for modes [s]."""

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.clips.mode_search import SETTLING_STEPS, modes_of, pursued, sinusoids
 from sound.clips.significance import Fit, settled
 from sound.synthesis.sinusoids import superposed
-
-Array = NDArray[np.float64]
 
 LONGEST_BLOW = 0.03
 """Greatest duration of a blow [s]; after it the modes vibrate freely."""

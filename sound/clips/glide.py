@@ -10,13 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Complex
 from sound.clips.bands import low_pass
 from sound.clips.candidates import LOWEST_HERTZ
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _HALF_WIDTH = 0.15
 """Half-width of the analysed band, over its tone's frequency."""

@@ -19,12 +19,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from sound.clips.extraction import ModalSound
-
-Array = NDArray[np.float64]
 
 CONCERT_HERTZ = 440.0
 """Frequency of A4."""

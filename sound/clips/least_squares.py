@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Complex
 from sound.synthesis.sinusoids import correlations, superposed
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _MOST_GROWTH = 40.0
 """Greatest growth of a sinusoid within the signal [nepers]; sums would overflow beyond."""

@@ -13,13 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Complex
 from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
 from sound.clips.pursuit import further
 from sound.clips.significance import Fit, settled
 from sound.synthesis.sinusoids import superposed
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 FEWEST_PERIODS = 3.0
 """Least number of periods of a mode within the clip; a slower oscillation counts as drift."""

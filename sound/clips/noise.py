@@ -7,9 +7,8 @@ at any point.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 FRAME_SECONDS = (0.08, 0.02)
 """Lengths of the short-time spectra, one after the other: long ones resolve tones 50 Hz apart,

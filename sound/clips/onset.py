@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 _QUIETER = 10.0
 """Least mean power after a strike, over that before it."""

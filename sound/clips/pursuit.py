@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Complex
 from sound.clips.candidates import HIGHEST_FRACTION, LEAST_QUALITY, LOWEST_HERTZ
 from sound.clips.significance import NEIGHBOURHOOD, power_under, threshold
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 APART = 4.0
 """Least distance of two new sinusoids, over the decay of the quicker one."""

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Complex
 from sound.clips.least_squares import fitted_coefficients, inverse, normal_matrix, refined
 from sound.synthesis.sinusoids import superposed
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 FALSE_MODES = 5e-4
 """Expected number of sinusoids in a clip of nothing but noise."""

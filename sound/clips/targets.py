@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from sound.clips.extraction import ModalSound
-
-Array = NDArray[np.float64]
 
 SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
 """Greatest distance of modes of different clips that count as one, in Hz or as a share, whichever

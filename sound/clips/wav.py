@@ -6,8 +6,8 @@ import io
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import cause, require_file
@@ -21,8 +21,6 @@ from sound.bounds import (
 from sound.clips.clipping import CLIPPED_RUN, is_clipped
 from sound.clips.riff import missing_bytes
 from sound.outputs import require_output
-
-Array = NDArray[np.float64]
 
 ENDINGS = (".wav",)
 """Endings of the names of sound files that are written."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 _NARROW_HERTZ, _WIDE_HERTZ = 1000.0 / 0.76, 7500.0
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 CENTS = 1200.0
 """Number of cents in an octave."""

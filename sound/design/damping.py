@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from carillon.arrays import Array
 from carillon.fem.geometry import HexMesh
 from solver.distribution.partition import partition_cells
 from sound.design.simulation import Evaluation, Simulation
 from sound.project.material_damping import MaterialDamping
-
-Array = NDArray[np.float64]
 
 ALIKE = 1e-4
 """Weight of the differences between loss factors.  It is small, and makes equal those that dampings

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.analysis.modes import Modes
 from sound.design.material import ReducedMaterial
 from sound.design.objective import DesignCost, Objective
 from sound.design.simulation import Evaluation, Simulation
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.element import quadrature_stiffness
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import finite_cell_model
@@ -18,8 +18,6 @@ from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import block_moduli, coarse_model
-
-Array = NDArray[np.float64]
 
 STRAINS = 6
 """Rank of the stiffness at a quadrature point."""

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from carillon.arrays import Array
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
@@ -24,7 +25,6 @@ from sound.design.simulation import Evaluation, Simulation
 from sound.design.tasks import Setting
 from sound.project.design import Design, FineFrequencies
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 CLEAR = 0.7

@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.design.descent import Descent, DesignDescent
-
-Array = NDArray[np.float64]
 
 LARGEST_DAMPING = 1e4
 """Greatest damping, over the mean curvature; with more, steps are too short to help."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.design.descent import Descent, DesignDescent
-
-Array = NDArray[np.float64]
 
 LARGE = 1e12
 """Cost of a material without modes."""

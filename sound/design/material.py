@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
 from carillon.fem.moduli import require_moduli
 from sound.design.poisson import FreePoisson
-
-Array = NDArray[np.float64]
 
 LAWS = ("linear", "exponential")
 """Laws from the field Phi z to moduli, see `ReducedMaterial`."""

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.analysis.modes import Modes
 from solver.linear import Inverse
 from solver.subspace.orthonormal import is_cancelled
-
-Array = NDArray[np.float64]
 
 SHIFTS = (0.5, 0.75)
 """Least and greatest shift over the last computed eigenvalue.  A Krylov space about such a shift is

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.subspace.spectrum import clusters
 from sound.design.bark import bark, bark_slope
 
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from sound.clips.targets import Targets
     from sound.project.settings import Weights
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 RESOLVED = 3e-3

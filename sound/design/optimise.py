@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.files.modes_file import frequencies
 from sound.design.interrupts import interruptible
 from sound.design.optimisers import OPTIMISERS
@@ -18,8 +19,6 @@ from sound.design.search import BudgetSpentError, Search, require_modes
 from sound.design.space_mapping import SpaceMapping
 from sound.design.tasks import SearchStep, Task
 from sound.project.design import HISTORY_TYPE, Design
-
-Array = NDArray[np.float64]
 
 KEEP_SECONDS = 30.0
 """Time between two intermediate designs of a search [s]."""

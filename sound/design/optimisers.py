@@ -6,15 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.design.gauss_newton import StepOptions
 from sound.design.limited_memory import LimitedMemory
 from sound.design.reduced_model import TrustRegion
 from sound.design.search import Search
 from sound.design.tasks import Task, Trial
-
-Array = NDArray[np.float64]
 
 ALTERNATING = ((True, False), (False, True), (True, True))
 """Terms that successive steps reduce: E_f, then E_a (section 6), then both, as each of the two

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.limits import DENSITIES
-
-Array = NDArray[np.float64]
 
 
 def weight(moduli: Array, density: float, bounds: Sequence[float] | None) -> float:

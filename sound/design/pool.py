@@ -18,9 +18,6 @@ from multiprocessing.queues import SimpleQueue
 from tempfile import TemporaryFile
 from threading import Thread
 
-import numpy as np
-from numpy.typing import NDArray
-
 from carillon.errors import ConvergenceError, UserError
 from carillon.processes import children
 from carillon.processes.threads import one_thread
@@ -31,8 +28,6 @@ from sound.design.objective import DesignCost
 from sound.design.reduced_model import TrustRegion, descend_by_model
 from sound.design.simulation import Evaluation, Simulation
 from sound.design.tasks import FAILED, SearchStep, Setting, Task, Trial
-
-Array = NDArray[np.float64]
 
 LISTEN_SECONDS = 0.1
 """Time between two looks whether somebody asked to stop, while processes work."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
@@ -27,8 +28,6 @@ from sound.project.usable import usable_strikes
 
 if TYPE_CHECKING:
     import trimesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

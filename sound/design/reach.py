@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from sound.clips.targets import Targets
 from sound.design.cents import cents
@@ -27,8 +27,6 @@ from sound.design.reduced_model import TrustRegion
 from sound.design.tasks import Task, Trial
 from sound.project.design import Design
 from sound.project.settings import Weights
-
-Array = NDArray[np.float64]
 
 HAD_CENTS = 15.0
 """Greatest distance of a mode from its target that counts as met [cents]."""

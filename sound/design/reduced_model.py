@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.design.descent import Descent, DesignDescent
 from sound.design.objective import Sensitivity
 from sound.design.simulation import Evaluation
-
-Array = NDArray[np.float64]
 
 INNER_STEPS = 12
 """Greatest number of steps on the reduced model, each of which solves a small eigenproblem."""

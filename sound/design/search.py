@@ -8,16 +8,12 @@ from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from sound.design.descent import DescentLimits
 from sound.design.objective import DesignCost, Objective
 from sound.design.pool import InterruptedRoundError, Pool
 from sound.design.tasks import SearchStep, Task, Trial
-
-Array = NDArray[np.float64]
-
 
 FEWEST = 2
 """Least number of evaluations of a descent: that of its start, and one of a step."""

@@ -13,7 +13,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
+
 Index = NDArray[np.int64]
 
 POINTS_AT_ONCE = 1024

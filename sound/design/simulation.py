@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.cells import FiniteCells
@@ -28,8 +29,6 @@ from sound.design.objective import Sensitivity
 from sound.design.poisson import FIRST, SECOND, elasticity_slope
 from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
 from sound.strikes import Strike
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-3
 """Relative error of eigenvalues at which an analysis stops; 1e-3 is about a hundredth of a bark."""

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.files.modes_file import frequencies
 from sound.design.cents import rms_cents
@@ -25,8 +25,6 @@ from sound.design.optimisers import descend_finely
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 from sound.design.tasks import SearchStep, Trial
-
-Array = NDArray[np.float64]
 
 FIRST_SHARE, LARGEST_SHARE = 0.2, 0.35
 """Share of the remaining budget of the first leg on the coarse solid, and the greatest share of

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from solver.analysis.problem import ProblemOptions
@@ -19,8 +19,6 @@ from sound.design.objective import DesignCost, Objective
 from sound.design.reduced_model import TrustRegion
 from sound.design.simulation import TOLERANCE, Simulation
 from sound.strikes import Strike
-
-Array = NDArray[np.float64]
 
 FAILED = DesignCost(np.inf, np.inf, np.inf, np.inf)
 """Cost of a material whose modes were not found."""

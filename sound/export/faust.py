@@ -14,16 +14,14 @@ from string import Template
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon import __version__
+from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
 from sound.project.design import Design
 from sound.rendering.listening import Listening
 from sound.rendering.render import DECAY_NEPERS
 from sound.rendering.solid import SoundingSolid
-
-Array = NDArray[np.float64]
 
 LEAST_DAMPING = 1e-3
 """Least damping [1/s], since Faust's models need finite decay times."""

@@ -34,8 +34,6 @@ from sound.project.design import Design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 
-Array = NDArray[np.float64]
-
 EXTENSION = "KHR_audio_rigid_bodies"
 DRAFT = (
     "draft by Karl Hiner, repository glTF_PhysicalAudio, "

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon import __version__
+from carillon.arrays import Array
 from sound.export.gltf_buffer import (
     FLOAT,
     TRIANGLES,
@@ -28,8 +28,6 @@ from sound.export.gltf_buffer import (
 )
 from sound.scenes.performance import Performance
 from sound.scenes.picture import Appearance, Camera, Motion, Picture, linear_light
-
-Array = NDArray[np.float64]
 
 EXTENSION = "KHR_audio_emitter"
 DRAFT = (

@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Integers
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.project.material_damping import MaterialDamping
 from sound.strikes import Strike
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.integer]
 
 HISTORY = {
     "seconds": ("s", "wall time since the optimisation began"),

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.errors import UserError
 from carillon.files.hdf5 import create_h5, open_h5
@@ -20,9 +19,6 @@ from sound.clips.targets import Targets
 from sound.project.design import HISTORY, HISTORY_TYPE, Design, FineFrequencies, fault
 from sound.project.material_damping import get_damping, put_damping
 from sound.strikes import Strike
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.integer]
 
 KIND = "design"
 SCHEMA = 1

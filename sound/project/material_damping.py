@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.files.model_group import put
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

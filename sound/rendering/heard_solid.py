@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.model import Solid
 from carillon.files.hdf5 import kind_of
@@ -21,7 +21,6 @@ from sound.rendering.render import Hit
 from sound.rendering.solid import SoundingSolid
 from sound.rendering.strike_list import ListedStrike, Point
 
-Array = NDArray[np.float64]
 Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]]]
 
 

@@ -7,13 +7,11 @@ from functools import cached_property
 from math import gcd
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.clips.noise import noise_part
 from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.response.response import SAMPLE_RATE_HERTZ, half_sine
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.bank import Bank, ring
-
-Array = NDArray[np.float64]
 
 DECAY_NEPERS = np.log(1e3)
 """Decay by 60 dB [nepers]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import RIGID_MODES, Solid
@@ -15,8 +15,6 @@ from solver.response.points import motion_at
 from solver.response.response import Damping
 from solver.subspace.spectrum import clusters
 from sound.project.design import Design
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError, UserError
 from sound.scenes.body import Body
 from sound.scenes.convex import convex_parts, hull_of
@@ -16,8 +16,6 @@ from sound.scenes.hertz import compliance
 from sound.scenes.object_solid import ObjectSolid, object_solid
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.shape import Shape
-
-Array = NDArray[np.float64]
 
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.shape import Shape
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.files.cache import remembered
 from carillon.files.datasets import INTEGER, read, refused
@@ -44,7 +45,6 @@ from sound.scenes.packages import REQUIREMENTS
 if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
     import trimesh
 
-Array = NDArray[np.float64]
 Faces = NDArray[np.integer]
 
 MOST_VERTICES = 64

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 
 if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
     import trimesh
 
-Array = NDArray[np.float64]
 Faces = NDArray[np.integer]
 
 HOLLOW = 0.02

@@ -8,9 +8,8 @@ effective mass 1 / m = 1 / m1 + 1 / m2.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 BOUNCE = 2.8683
 """Factor of the duration of a bounce: 2 (15 / 16)^(2/5) times the integral of (1 - x^(5/2))^(-1/2)

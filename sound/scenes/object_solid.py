@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.model import Solid
@@ -26,7 +27,6 @@ from sound.scenes.uniform import Discretised, UniformSolid, uniform_solid
 if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
     import trimesh
 
-Array = NDArray[np.float64]
 
 BALL_DIVISIONS = 3
 """Number of times that the faces of an icosahedron are divided to make the surface of a ball."""

@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from sound.scenes.picture import Picture
-
-Array = NDArray[np.float64]
 
 GROUND = -1
 """Number that stands for the ground in pairs of bodies."""

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon import __version__
+from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
@@ -36,7 +36,6 @@ from sound.rendering.solid import SoundingSolid
 if TYPE_CHECKING:  # Its import takes long.
     import trimesh
 
-Array = NDArray[np.float64]
 
 YOUNG, DENSITY = 1e9, 1000.0
 """Young's modulus [Pa] and density [kg/m^3] of the solid whose modes are computed."""

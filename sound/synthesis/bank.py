@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.synthesis.sinusoids import sampled_exponents
-
-Array = NDArray[np.float64]
 
 BLOCK = 512
 """Number of samples that one matrix product computes for all modes."""

@@ -14,10 +14,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.response.response import half_sine
 from sound.synthesis.sinusoids import sampled_exponents
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BLOCK = 64

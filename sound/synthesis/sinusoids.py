@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from carillon.arrays import Array, Complex
 
 _BLOCK = 512
 """Number of samples that one matrix product computes."""

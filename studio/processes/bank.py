@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.clips.targets import Targets
 from sound.design.bark import bark
 from sound.design.cents import cents, rms_cents
 from sound.rendering.listening import near_weights
 from sound.rendering.solid import struck_amplitudes
 from studio.binary import pack
-
-Array = NDArray[np.float64]
 
 LOUDEST = 0.5
 """Peak of the loudest strike of a solid without clips, as a share of full scale."""

@@ -6,14 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sound.clips.files import extract_file
 from sound.clips.noise import noise_part
 from sound.clips.remarks import remarks
 from sound.clips.wav import as_wav, read_wav
-
-Array = NDArray[np.float64]
 
 LEAST_SHARE = 1e-12
 """Smallest share of energy left unexplained that is shown, so that decibels stay finite."""

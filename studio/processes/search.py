@@ -9,8 +9,8 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.design.optimise import optimise
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search
@@ -18,7 +18,6 @@ from sound.design.tasks import SearchStep
 from sound.project.design_file import read_design, write_design
 from studio.processes.history import history_of, rows_of
 
-Array = NDArray[np.float64]
 Tell = Callable[[dict[str, Any]], None]
 
 TOLD_SECONDS = 0.25

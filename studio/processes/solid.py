@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.processes.threads import one_thread
 from solver.analysis.modes import Modes
@@ -43,8 +43,6 @@ from sound.surface import longest_side, struck_surface
 from studio.binary import pack
 from studio.processes.bank import Aim, Heard, bank
 from studio.processes.history import history_of
-
-Array = NDArray[np.float64]
 
 MODES = 30
 """Elastic modes of a solid that has no targets yet."""

@@ -6,8 +6,8 @@ import io
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from solver.refinement.errors import FROM_SOLID
 from sound.scenes.performance import GROUND, Impact, Performance, Voice
@@ -15,7 +15,6 @@ from sound.scenes.picture import Appearance
 from studio.binary import pack
 from studio.standalone.content import halved, index_type, stepped
 
-Array = NDArray[np.float64]
 Arrays = dict[str, tuple[str, Any]]
 
 GROUND_ON_PAGE = 65_535

@@ -6,15 +6,13 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.design.cents import cents, rms_cents
 from sound.project.design import Design
 from sound.rendering.listening import Listening, near_weights
 from sound.rendering.solid import SoundingSolid
 from studio.binary import pack
-
-Array = NDArray[np.float64]
 
 STEPS = 65_535
 """Into which the longest side of the solid, and the range of its moduli, are divided."""

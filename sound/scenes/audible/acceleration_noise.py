@@ -16,9 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED
-
-Array = NDArray[np.float64]
 
 MATCHED_HERTZ = 10_000.0
 """Frequency [Hz] at which the filter has the magnitude of the sphere's response; a quarter of the

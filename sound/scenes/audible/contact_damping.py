@@ -8,11 +8,9 @@ damping of a mode U_k.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.hertz import stiffness
-
-Array = NDArray[np.float64]
 
 DAMPING_RATIO = 0.1
 """Damping ratio of a contact: an assumption that stands for all losses there."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.rendering.solid import struck_amplitudes
 from sound.scenes.audible.contact_damping import greatest_damping, motion_along
 from sound.scenes.audible.resting_contact import Rest
@@ -15,7 +16,6 @@ from sound.scenes.body import Body
 from sound.scenes.contact.impacts import HertzImpact
 from sound.synthesis.driven import BLOCK, Excitation
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 PLACES_AT_ONCE = 4096

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.audible.radiation import SOUND_SPEED
 from sound.scenes.picture import Motion
-
-Array = NDArray[np.float64]
 
 HEAD_RADIUS = 0.0875
 """Radius [m] of an average head."""

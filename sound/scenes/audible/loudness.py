@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import fftconvolve, lfilter
 
+from carillon.arrays import Array
 from sound.scenes.audible.acceleration_noise import acceleration_filter, equivalent_radius
 from sound.scenes.audible.excitation import mean_places
 from sound.scenes.audible.radiation import Radiation, radiated
@@ -15,8 +15,6 @@ from sound.scenes.body import Body
 from sound.scenes.contact.impacts import HertzImpact
 from sound.scenes.performance import Voice
 from sound.synthesis.driven import pulse
-
-Array = NDArray[np.float64]
 
 CHANNELS = 4
 """Number of channels of a body: one equal in all directions, and one along each of its axes."""

@@ -24,9 +24,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.shape import Shape
 
-Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
 
 AIR_DENSITY = 1.204

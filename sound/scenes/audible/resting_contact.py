@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.audible.contact_damping import dashpot, motion_along
 from sound.scenes.contact.impacts import LASTING, SustainedContact
 from sound.scenes.scene import EngineEntry
-
-Array = NDArray[np.float64]
 
 
 class Rest(NamedTuple):

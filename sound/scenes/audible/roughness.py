@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 LONGEST_WAVE = 5e-3
 """Greatest wavelength [m] of roughness; longer ones belong to the shape of the surface."""

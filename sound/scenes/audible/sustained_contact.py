@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
+from carillon.arrays import Array
 from sound.scenes.audible.contact_damping import dashpot
 from sound.scenes.audible.roughness import profile
 from sound.scenes.contact.contacts import ContactPoints
@@ -15,7 +16,6 @@ from sound.scenes.contact.impacts import SustainedContact
 from sound.scenes.hertz import patch_radius, stiffness
 from sound.synthesis.driven import BLOCK
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LOWEST_HERTZ = 20.0

@@ -5,10 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
-
-Array = NDArray[np.float64]
 
 PHASES = 16
 """Number of moments within a step at which a bounce may begin; their bounces are averaged."""

@@ -8,9 +8,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.contact.contacts import ContactPoints
-
-Array = NDArray[np.float64]
 
 CHUNK = 1 << 16
 """Number of points that memory is allocated for at a time."""

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.logs import warn_once
 from carillon.command_line.progress import track
 from carillon.errors import UserError, one_line
@@ -22,8 +23,6 @@ from sound.scenes.materials import NamedMaterial
 from sound.scenes.packages import scene_package
 from sound.scenes.picture import Motion
 from sound.scenes.scene import EngineEntry, Vector
-
-Array = NDArray[np.float64]
 
 PICTURES_PER_SECOND = 120
 """Number of poses of each body that are kept for every second."""

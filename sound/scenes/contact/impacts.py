@@ -12,18 +12,15 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, grey_opening
 from scipy.signal import find_peaks, peak_prominences
 
+from carillon.arrays import Array, Integers
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.contact.touch import Spots, Touch
 from sound.scenes.hertz import bounce_seconds
 from sound.scenes.performance import Impact
 from sound.scenes.scene import EngineEntry, Vector
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.integer]
 
 LASTING = 2.5
 """Least duration of a sustained force, in durations of a bounce of the engine."""

@@ -12,16 +12,14 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from sound.scenes.body import Body
 from sound.scenes.contact.impacts import SLOWEST
 from sound.scenes.performance import GROUND
 from sound.scenes.scene import Vector
-
-Array = NDArray[np.float64]
 
 OVERLAP = 0.01
 """Greatest depth of an overlap that is separated, over the longest side of the smaller body; a

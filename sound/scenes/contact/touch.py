@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from carillon.arrays import Array
 from sound.scenes.body import Body
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.hertz import compliance
 from sound.scenes.materials import NamedMaterial
 from sound.scenes.performance import GROUND
-
-Array = NDArray[np.float64]
 
 
 class Spots(NamedTuple):

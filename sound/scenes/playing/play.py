@@ -6,7 +6,6 @@ import time
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError
@@ -21,8 +20,6 @@ from sound.scenes.picture import Appearance, Picture
 from sound.scenes.playing.scene_sound import SceneSound, gains_of, sustained_forces
 from sound.scenes.playing.viewpoint import camera_of, head_of
 from sound.scenes.scene import Scene
-
-Array = NDArray[np.float64]
 
 FULL = 0.99
 """Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""

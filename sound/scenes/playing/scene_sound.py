@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.processes.threads import in_parallel
 from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, along, heard, towards
@@ -21,8 +21,6 @@ from sound.scenes.materials import NamedMaterial
 from sound.scenes.performance import GROUND
 from sound.scenes.scene import EngineEntry, SoundEntry
 from sound.synthesis.driven import ring
-
-Array = NDArray[np.float64]
 
 AT_ONCE = 16
 """Number of bodies whose sounds are held in memory before they are added up."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from sound.scenes.audible.hearing import Head
 from sound.scenes.body import Body
 from sound.scenes.picture import Camera, Motion
 from sound.scenes.scene import CameraEntry, ListenerEntry
-
-Array = NDArray[np.float64]
 
 FROM = np.array([0.25, -1.0, 0.42]) / np.linalg.norm([0.25, -1.0, 0.42])
 """Unit vector to the camera: in front, a little to the right and above."""
