@@ -24,81 +24,66 @@ MEASURED = measured(lambda study: study.origins, _repeats)
 
 
 @table(
-    lambda study: (
-        f"""Rms error of the first {study.measured["elastic_modes"]} elastic frequencies with as
-        many unknowns, and in the same wall time, as the finite cells of one level; between
-        levels log error is interpolated over log unknowns or log time, and beyond them nothing
-        is said. The rate is the power of the spacing with which the error falls, by least
-        squares over all levels."""
-    ),
-    [
-        hidden("solid", "Solid"),
-        Column("title", "Solid"),
-        hidden("discretisation", "Discretisation"),
-        Column("label", "Model of"),
-        Column("rate", "Rate", "score"),
-        Column("unknowns", "At unknowns", "count"),
-        Column("error_at_unknowns", "rms error", "percent"),
-        Column("seconds", "In time", "seconds"),
-        Column("error_at_seconds", "rms error", "percent"),
-    ],
+    hidden("solid", "Solid"),
+    Column("title", "Solid"),
+    hidden("discretisation", "Discretisation"),
+    Column("label", "Model of"),
+    Column("rate", "Rate", "score"),
+    Column("unknowns", "At unknowns", "count"),
+    Column("error_at_unknowns", "rms error", "percent"),
+    Column("seconds", "In time", "seconds"),
+    Column("error_at_seconds", "rms error", "percent"),
     keys="solid discretisation",
     conditions=MEASURED,
 )
 def summary(study: AccuracyStudy) -> Iterator[Row]:
-    """Rates, and errors at equal unknowns and at equal time."""
+    """Rms error of the first {measured[elastic_modes]} elastic frequencies with as many unknowns,
+    and in the same wall time, as the finite cells of one level; between levels log error is
+    interpolated over log unknowns or log time, and beyond them nothing is said. The rate is the
+    power of the spacing with which the error falls, by least squares over all levels."""
     for row in study.measured["summary"]:
         yield {**row, **_names(study, row)}
 
 
 @table(
-    lambda study: (
-        f"""Unknowns, wall time from the surface or the solid’s description to the mesh (build)
-        and from there to the modes, assembly included (solve), and relative errors of the first
-        {study.measured["elastic_modes"]} elastic frequencies, matched by index: root mean
-        square, the one that finite cells expect of themselves, and the worst, negative if too
-        low. The spacing is that between neighbouring nodes: half of the edge of quadratic
-        elements."""
-    ),
-    [
-        hidden("solid", "Solid"),
-        Column("title", "Solid"),
-        hidden("discretisation", "Discretisation"),
-        Column("label", "Model of"),
-        Column("spacing", "Spacing [mm]", "score", "mm"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("build_seconds", "Build", "seconds"),
-        Column("solve_seconds", "Solve", "seconds"),
-        Column("rms", "Rms", "percent"),
-        Column("expected", "Expected", "percent"),
-        Column("worst", "Worst", "percent"),
-        hidden("worst_mode", "at mode", "count"),
-        hidden("problem", "Why not"),
-    ],
+    hidden("solid", "Solid"),
+    Column("title", "Solid"),
+    hidden("discretisation", "Discretisation"),
+    Column("label", "Model of"),
+    Column("spacing", "Spacing [mm]", "score", "mm"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("build_seconds", "Build", "seconds"),
+    Column("solve_seconds", "Solve", "seconds"),
+    Column("rms", "Rms", "percent"),
+    Column("expected", "Expected", "percent"),
+    Column("worst", "Worst", "percent"),
+    hidden("worst_mode", "at mode", "count"),
+    hidden("problem", "Why not"),
     keys="solid discretisation spacing",
     conditions=MEASURED,
 )
 def levels(study: AccuracyStudy) -> Iterator[Row]:
-    """Every model."""
+    """Unknowns, wall time from the surface or the solid’s description to the mesh (build) and from
+    there to the modes, assembly included (solve), and relative errors of the first
+    {measured[elastic_modes]} elastic frequencies, matched by index: root mean square, the one that
+    finite cells expect of themselves, and the worst, negative if too low. The spacing is that
+    between neighbouring nodes: half of the edge of quadratic elements."""
     for row in study.measured["levels"]:
         yield {**row, **_names(study, row), "spacing": 1e3 * row["spacing"]}
 
 
 @table(
-    """Rayleigh-Ritz over the whole solid with polynomials of these degrees along its axes; the
-    largest relative change that a frequency takes from degrees lower by 2, and the first and
-    last frequency compared.""",
-    [
-        hidden("solid", "Solid"),
-        Column("title", "Solid"),
-        Column("degrees", "Degrees"),
-        Column("change", "Change", "percent"),
-        Column("first", "First [Hz]", "hertz", "Hz"),
-        Column("last", "Last [Hz]", "hertz", "Hz"),
-    ],
+    hidden("solid", "Solid"),
+    Column("title", "Solid"),
+    Column("degrees", "Degrees"),
+    Column("change", "Change", "percent"),
+    Column("first", "First [Hz]", "hertz", "Hz"),
+    Column("last", "Last [Hz]", "hertz", "Hz"),
 )
 def references(study: AccuracyStudy) -> Iterator[Row]:
-    """Degrees of the polynomials, and what lower ones change."""
+    """Rayleigh-Ritz over the whole solid with polynomials of these degrees along its axes; the
+    largest relative change that a frequency takes from degrees lower by 2, and the first and last
+    frequency compared."""
     for name, reference in study.measured["references"].items():
         yield {
             **reference,

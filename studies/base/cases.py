@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
-from studies.base.conditions import Record
+import numpy as np
+
+from studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, Record, measured
 from studies.base.results import Results
 from studies.base.study import Study, no_files
-from studies.base.table import Column, Row, hidden
+from studies.base.table import Column, Row, each, hidden
 from workflow import solids
 
 ALL = "all"
 """Name that stands for every material in pooled tables."""
-CASE_COLUMNS = (
-    hidden("model", "Model"),
-    Column("title", "Solid"),
-    Column("resolution", "Resolution", "count"),
-    Column("material", "Material"),
-)
-"""Columns that tell cases apart."""
+UNTIMED = measured(lambda study: study.records, NOT_TIMED)
+ONE_RUN = measured(lambda study: study.records, ONE_COLD_RUN)
+"""Conditions of tables whose numbers are no times, or times of one run."""
 
 
 @dataclass(frozen=True)
@@ -38,17 +36,25 @@ class Case:
         return f"{self.solid}/{self.resolution}-{self.material}.json"
 
 
+def case_columns(shown: str = "title resolution material") -> list[Column]:
+    """Columns that tell cases apart, of which people see those `shown`."""
+    columns = (
+        Column("model", "Model"),
+        Column("title", "Solid"),
+        Column("resolution", "Resolution", "count"),
+        Column("material", "Material"),
+    )
+    return [replace(column, shown=column.key in shown.split()) for column in columns]
+
+
 def error_columns(materials: Iterable[str]) -> list[Column]:
     """Columns of the rms and the worst error with each material, and with all of them."""
-    return [
-        column
-        for each in (*materials, ALL)
-        for column in (
-            Column(f"{each}_rms", f"{each.capitalize()}, rms", "percent"),
-            Column(f"{each}_worst", "worst", "percent"),
-            hidden(f"{each}_where", "at"),
-        )
-    ]
+    return each(
+        {material: material.capitalize() for material in (*materials, ALL)},
+        Column("{name}_rms", "{label}, rms", "percent"),
+        Column("{name}_worst", "worst", "percent"),
+        hidden("{name}_where", "at"),
+    )
 
 
 @dataclass(frozen=True)
@@ -105,6 +111,11 @@ class CaseResults(Results):
         return {case: self.read_json(f"cases/{case.path}") for case in cases}
 
     @property
+    def first(self) -> dict[str, Any]:
+        """Content of the first file, for what is the same in all of them."""
+        return next(iter(self.ratings.values()))
+
+    @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every case."""
         return {f"cases/{case.path}": each["provenance"] for case, each in self.ratings.items()}
@@ -131,6 +142,20 @@ class CaseResults(Results):
     def label(self, case: Case) -> str:
         """A case in a few words."""
         return f"{self.titles[case.solid]} {case.resolution}, {case.material}"
+
+
+def pooled(study: CaseResults, errors: Mapping[Case, Mapping[str, Any]]) -> Row:
+    """Rms over all cases, the worst error and where it is, with each material and with all."""
+    row: Row = {}
+    for material in (*study.part["materials"], ALL):
+        cases = [case for case in errors if material in (case.material, ALL)]
+        worst = max(cases, key=lambda case: abs(errors[case]["worst"]))
+        row |= {
+            f"{material}_rms": float(np.sqrt(np.mean([errors[c]["rms"] ** 2 for c in cases]))),
+            f"{material}_worst": errors[worst]["worst"],
+            f"{material}_where": f"{study.label(worst)}, mode {errors[worst]['worst_mode']}",
+        }
+    return row
 
 
 def truths_of(study: CaseResults) -> Iterator[Row]:

@@ -30,7 +30,7 @@ def show(value: Any, kind: str = "text") -> str:
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return MISSING
-    text = _FORMATS[kind](value)
+    text = KINDS[kind](value)
     return text if kind == "text" else text.replace("-", "−")
 
 
@@ -81,7 +81,7 @@ def _power(value: float) -> str:
     return power if mantissa == "1.0" else f"{mantissa}·{power}"
 
 
-_FORMATS: dict[str, Callable[[Any], str]] = {
+KINDS: dict[str, Callable[[Any], str]] = {
     "text": str,
     "count": lambda value: f"{int(value):,}",
     "hertz": lambda value: _digits(value, 5),
@@ -98,3 +98,4 @@ _FORMATS: dict[str, Callable[[Any], str]] = {
     "fraction": lambda value: _digits(value, 3),
     "range": lambda value: f"{value[0]:,.0f}…{value[1]:,.0f}",
 }
+"""How values of each kind are written."""

@@ -13,23 +13,20 @@ KEYS = ("command", "commit", "config_hash", "blas", "processor", "cores")
 
 
 @table(
-    """Origin of every result file: the command, the commit of the code, seed and hash of all
-    parameters, and the machine. Training data name neither BLAS nor cores, since their bytes
-    are the same with any.""",
-    [
-        Column("file", "File"),
-        Column("command", "Command"),
-        Column("commit", "Commit"),
-        Column("seed", "Seed"),
-        Column("config_hash", "Parameters' hash"),
-        Column("blas", "BLAS"),
-        Column("processor", "Processor"),
-        Column("cores", "Cores", "count"),
-        Column("versions", "Versions"),
-    ],
+    Column("file", "File"),
+    Column("command", "Command"),
+    Column("commit", "Commit"),
+    Column("seed", "Seed"),
+    Column("config_hash", "Parameters' hash"),
+    Column("blas", "BLAS"),
+    Column("processor", "Processor"),
+    Column("cores", "Cores", "count"),
+    Column("versions", "Versions"),
 )
 def provenance(results: Any) -> Iterator[Row]:
-    """A row for each of the `origins` of results: records by file."""
+    """Origin of every result file: the command, the commit of the code, seed and hash of all
+    parameters, and the machine. Training data name neither BLAS nor cores, since their bytes are
+    the same with any."""
     for file, origin in results.origins.items():
         yield {
             "file": file,

@@ -14,14 +14,16 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from itertools import takewhile
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 from carillon.files.atomic import atomic_path
 from studies.base.conditions import Conditions, read_conditions
-from studies.base.numbers import show
+from studies.base.numbers import KINDS, show
 
 MIN, MAX, KIND, MARK = "_min", "_max", "_kind", "_mark"
 """Endings of columns that tell something about another column."""
@@ -81,6 +83,24 @@ def spread(
     """
     ends = (Column(f"{key}{end}", end[1:], kind, unit, shown) for end in (MIN, MAX))
     return (Column(key, label, kind, unit, source=source), *ends)
+
+
+def each(names: Iterable[str] | Mapping[str, str], *columns: Column) -> list[Column]:
+    """These columns for each name; `{name}` and `{label}` in their texts are it and its label.
+
+    Examples
+    --------
+    >>> both = each({"a": "First", "b": "Second"}, Column("{name}_s", "{label}, time"))
+    >>> [(column.key, column.label) for column in both]
+    [('a_s', 'First, time'), ('b_s', 'Second, time')]
+    """
+    labels = names if isinstance(names, Mapping) else {name: name for name in names}
+    parts = ("key", "label", "source")
+    return [
+        replace(c, **{part: getattr(c, part).format(name=n, label=label) for part in parts})
+        for n, label in labels.items()
+        for c in columns
+    ]
 
 
 @dataclass(frozen=True)
@@ -156,24 +176,28 @@ def kind_in(row: Row, column: Column) -> str:
     return row.get(f"{column.key}{KIND}") or column.kind
 
 
+Columns = Column | Iterable[Column] | Callable[[Any], Iterable[Column]]
+"""A column, several, or a function of the results that returns them."""
+
+
 @dataclass(frozen=True)
 class Tabulation:
     """How a table is made from results, see `table`."""
 
     name: str
     rows: Callable[[Any], Iterable[Row]]
-    caption: str | Callable[[Any], str]
-    columns: Sequence[Column] | Callable[[Any], Sequence[Column]]
+    caption: Callable[[Any], str]
+    columns: Sequence[Columns]
     keys: str = ""
     conditions: Callable[[Any], Conditions | None] | None = None
 
     def __call__(self, results: Any) -> Table:
         """Make the table, its name behind the `prefix` of the results if they have one."""
-        columns = list(self.columns(results) if callable(self.columns) else self.columns)
-        caption = self.caption(results) if callable(self.caption) else self.caption
+        given = [part(results) if callable(part) else part for part in self.columns]
+        columns = [c for part in given for c in ([part] if isinstance(part, Column) else part)]
         return Table(
             f"{getattr(results, 'prefix', '')}{self.name}",
-            re.sub(r"\s*\n\s*", " ", caption).strip(),
+            re.sub(r"\s*\n\s*", " ", self.caption(results)).strip(),
             columns,
             [_picked(row, columns) for row in self.rows(results)],
             self.keys.split(),
@@ -182,34 +206,46 @@ class Tabulation:
 
 
 def table(
-    caption: str | Callable[[Any], str],
-    columns: Sequence[Column] | Callable[[Any], Sequence[Column]],
+    *columns: Columns,
     keys: str = "",
     conditions: Callable[[Any], Conditions | None] | None = None,
     name: str = "",
+    caption: Callable[[Any], str] | None = None,
 ) -> Callable[[Callable[[Any], Iterable[Row]]], Tabulation]:
     """Make a table of a function that yields its rows from results.
 
-    Rows hold values by key or source; a column without its value is empty.
+    Rows hold values by key or source; a column without its value is empty. The docstring of the
+    function is the caption: what the table shows, over which modes, against which base. Fields in
+    its braces are attributes of the results, shown as of the kind that their format names.
 
     Parameters
     ----------
-    caption
-        What the table shows, over which modes, against which base; it, and the columns, may depend
-        on the results. Lines are joined.
     keys
         Columns that tell the rows apart, the first one if there are none.
     conditions
         Says how the results were measured.
     name
         Of the table, that of the function if empty.
+    caption
+        Makes the caption of the results where a docstring cannot say it.
     """
 
     def of_rows(rows: Callable[[Any], Iterable[Row]]) -> Tabulation:
         own = name or rows.__name__.replace("_", "-")
-        return Tabulation(own, rows, caption, columns, keys, conditions)
+        text = caption or partial(_Caption().format, rows.__doc__ or "")
+        return Tabulation(own, rows, text, columns, keys, conditions)
 
     return of_rows
+
+
+class _Caption(Formatter):
+    """Fields are attributes of the results, and formats are kinds."""
+
+    def get_value(self, key: int | str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        return getattr(args[0], str(key))
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        return show(value, format_spec) if format_spec in KINDS else format(value, format_spec)
 
 
 def _picked(row: Row, columns: Iterable[Column]) -> Row:

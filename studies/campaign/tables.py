@@ -11,27 +11,24 @@ from studies.campaign.results import FAILED as FAILED
 
 
 @table(
-    """Every cell, the worst first. Nearest: the criterion that is missed by most, or of a cell
-    that passed the one that comes nearest to its limit, and what it found as a share of the
-    limit. Of a cell that was not run, the reason.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("material", "Material"),
-        Column("seed", "Seed", "count"),
-        Column("ranks", "Ranks", "count"),
-        Column("end", "Verdict"),
-        Column("missed", "Criteria missed", "count"),
-        Column("what", "Nearest"),
-        Column("of", "Spectrum"),
-        Column("share", "Share of its limit", "small"),
-        Column("seconds", "Time", "seconds"),
-        hidden("command", "Command"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("material", "Material"),
+    Column("seed", "Seed", "count"),
+    Column("ranks", "Ranks", "count"),
+    Column("end", "Verdict"),
+    Column("missed", "Criteria missed", "count"),
+    Column("what", "Nearest"),
+    Column("of", "Spectrum"),
+    Column("share", "Share of its limit", "small"),
+    Column("seconds", "Time", "seconds"),
+    hidden("command", "Command"),
     keys="model material seed ranks",
 )
 def cells(study: Campaign) -> Iterator[Row]:
-    """Every cell, the worst first."""
+    """Every cell, the worst first. Nearest: the criterion that is missed by most, or of a cell that
+    passed the one that comes nearest to its limit, and what it found as a share of the limit. Of a
+    cell that was not run, the reason."""
     for cell, result in study.found.items():
         end, worst = end_of(result), nearest(result)
         row: Row = {
@@ -56,20 +53,17 @@ def cells(study: Campaign) -> Iterator[Row]:
 
 
 @table(
-    """Cells by how they ended. Wrong: a spectrum is not that of its matrices. Missed: a
-    criterion that says something less.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("cells", "Cells", "count"),
-        Column("passed", "Passed", "count"),
-        Column("missed", "Missed", "count"),
-        Column("wrong", "Wrong", "count"),
-        Column("not_run", "Not run", "count"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("cells", "Cells", "count"),
+    Column("passed", "Passed", "count"),
+    Column("missed", "Missed", "count"),
+    Column("wrong", "Wrong", "count"),
+    Column("not_run", "Not run", "count"),
 )
 def solids(study: Campaign) -> Iterator[Row]:
-    """How the cells of every solid ended."""
+    """Cells by how they ended. Wrong: a spectrum is not that of its matrices. Missed: a criterion
+    that says something less."""
     for solid in study.solids:
         ends = [end_of(each) for cell, each in study.found.items() if cell.solid == solid]
         row: Row = {"model": solid, "title": study.titles[solid], "cells": len(ends)}

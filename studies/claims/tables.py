@@ -30,22 +30,19 @@ COMMANDS = {
 
 
 @table(
-    """Figures are read from the tables that are listed below, or from measurements that are
-    kept with the command that made them; the paper’s are quoted with their place. In part:
-    something of the claim holds, or it was tried on less than the claim says. Less is needed:
-    of what the paper says that it costs.""",
-    [
-        hidden("key", "Key"),
-        Column("place", "Place"),
-        Column("claim", "The paper’s claim"),
-        Column("measured", "Measured here"),
-        Column("verdict", "Verdict"),
-        Column("why", "Why"),
-        Column("files", "From"),
-    ],
+    hidden("key", "Key"),
+    Column("place", "Place"),
+    Column("claim", "The paper’s claim"),
+    Column("measured", "Measured here"),
+    Column("verdict", "Verdict"),
+    Column("why", "Why"),
+    Column("files", "From"),
 )
 def claims(results: Claims) -> Iterator[Row]:
-    """A row a claim: place, claim, what was measured, verdict, why."""
+    """Figures are read from the tables that are listed below, or from measurements that are kept
+    with the command that made them; the paper’s are quoted with their place. In part: something of
+    the claim holds, or it was tried on less than the claim says. Less is needed: of what the paper
+    says that it costs."""
     texts = Environment(undefined=StrictUndefined)
     texts.filters["show"] = show
     values = printed(results.paper)
@@ -88,26 +85,23 @@ def printed(paper: dict[str, Any]) -> dict[str, Any]:
 
 
 @table(
-    """Times of Fig. 11 as printed, and those measured here on meshes of about the paper’s
-    unknowns. Both compute 256 modes in full; the machines are years apart.""",
-    [
-        Column("solid", "Solid"),
-        Column("paper_unknowns", "Paper: unknowns", "count"),
-        Column("paper_arpack", "ARPACK", "seconds"),
-        Column("paper_all", "DDFEM* + HCMS + EC", "seconds"),
-        Column("paper_ratio", "Speed-up", "times"),
-        Column("unknowns", "Here: unknowns", "count"),
-        Column("slepc", "SLEPc", "seconds"),
-        Column("cold_seconds", "cold", "seconds"),
-        Column("warm_seconds", "warm", "seconds"),
-        Column("cold", "Speed-up, cold", "times"),
-        Column("warm", "warm", "times"),
-        Column("error", "Frequencies, rms", "percent"),
-        Column("note", "Note"),
-    ],
+    Column("solid", "Solid"),
+    Column("paper_unknowns", "Paper: unknowns", "count"),
+    Column("paper_arpack", "ARPACK", "seconds"),
+    Column("paper_all", "DDFEM* + HCMS + EC", "seconds"),
+    Column("paper_ratio", "Speed-up", "times"),
+    Column("unknowns", "Here: unknowns", "count"),
+    Column("slepc", "SLEPc", "seconds"),
+    Column("cold_seconds", "cold", "seconds"),
+    Column("warm_seconds", "warm", "seconds"),
+    Column("cold", "Speed-up, cold", "times"),
+    Column("warm", "warm", "times"),
+    Column("error", "Frequencies, rms", "percent"),
+    Column("note", "Note"),
 )
 def solids(results: Claims) -> Iterator[Row]:
-    """Fig. 11 solid by solid: the paper's times, and those here if the mesh is at hand."""
+    """Times of Fig. 11 as printed, and those measured here on meshes of about the paper’s unknowns.
+    Both compute 256 modes in full; the machines are years apart."""
     full = results.in_full("methods") or results.of_run("methods")
     here = {row["model"]: row for row in full.rows}
     for name, printed_row in results.paper["times"].items():
@@ -146,18 +140,15 @@ def _measured(row: Row) -> Row:
 
 
 @table(
-    """Files that the figures above are read from, below the folder of this run or of the
-    checkout.""",
-    [
-        Column("file", "File"),
-        Column("command", "Made by"),
-        Column("commit", "Commit"),
-        Column("date", "Date"),
-        Column("machine", "Processor"),
-    ],
+    Column("file", "File"),
+    Column("command", "Made by"),
+    Column("commit", "Commit"),
+    Column("date", "Date"),
+    Column("machine", "Processor"),
 )
 def sources(results: Claims) -> Iterator[Row]:
-    """Every file that figures are from, what made it, and where it was measured."""
+    """Files that the figures above are read from, below the folder of this run or of the
+    checkout."""
     for name in dict.fromkeys(results.read):
         conditions = results.read[name].conditions
         yield {

@@ -13,7 +13,7 @@ from studies.base.parts import grid, html, plot, prose
 from studies.base.table import Table
 from studies.coarsening.pictures import mode_pictures
 from studies.coarsening.results import CoarseningStudy
-from studies.coarsening.tables import FIRST, LABELS, METHODS, rank_correlation, speeds
+from studies.coarsening.tables import LABELS, METHODS, rank_correlation, speeds
 
 Tables = dict[str, Table]
 
@@ -26,7 +26,7 @@ def page(study: CoarseningStudy, tables: Tables) -> StudyPage:
         plain=plain,
         refined=refined,
         goals=study.goals,
-        span=f"{FIRST}–{study.last}",
+        span=f"7–{study.last}",
         correlation=rank_correlation(study),
     )
     solids = [solid for solid in study.solids if study.worst_of(solid) is not None]

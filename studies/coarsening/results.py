@@ -25,8 +25,7 @@ class CoarseningStudy(CaseResults):
     @property
     def goals(self) -> dict[str, float]:
         """Limits of `rms` and `worst` error, and from where on a mode is `far_off`."""
-        goals: dict[str, float] = next(iter(self.ratings.values()))["goals"]
-        return goals
+        return self.first["goals"]
 
     @property
     def last(self) -> int:
@@ -35,8 +34,7 @@ class CoarseningStudy(CaseResults):
 
     def errors(self, case: Case, model: str, kind: str = "by_index") -> dict[str, Any]:
         """Summary of the errors of a model `by_index`, `recognised` or `expected`."""
-        errors: dict[str, Any] = self.ratings[case][model][kind]
-        return errors
+        return self.ratings[case][model][kind]
 
     def meets_goals(self, case: Case, model: str) -> bool:
         """Whether the true errors are within both limits."""

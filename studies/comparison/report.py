@@ -194,18 +194,15 @@ LISTED = table(
 
 
 @table(
-    """Numbers that both folders have, by table. Worse is slower, less accurate or larger,
-    better the opposite; what changed otherwise is neither.""",
-    [
-        Column("table", "Table"),
-        Column("compared", "Compared", "count"),
-        Column("worse", "Worse", "count"),
-        Column("better", "Better", "count"),
-        Column("other", "Changed otherwise", "count"),
-    ],
+    Column("table", "Table"),
+    Column("compared", "Compared", "count"),
+    Column("worse", "Worse", "count"),
+    Column("better", "Better", "count"),
+    Column("other", "Changed otherwise", "count"),
 )
 def counts(cells: pd.DataFrame) -> list[Row]:
-    """How many numbers of each table were compared, and what became of them."""
+    """Numbers that both folders have, by table. Worse is slower, less accurate or larger, better
+    the opposite; what changed otherwise is neither."""
     of = {name: cells["verdict"].isin(verdicts) for name, verdicts in CLASSES.items()}
     summed = pd.DataFrame({"compared": 1, **of}).groupby(cells["table"], sort=False).sum()
     rows: list[Row] = summed.reset_index().to_dict("records")

@@ -6,7 +6,6 @@ from studies.base.page import StudyPage, origins, section
 from studies.base.parts import grid, html, note, plot, prose, tiles
 from studies.base.table import Table
 from studies.discretisation.results import DiscretisationStudy
-from studies.discretisation.tables import FIRST
 
 MATERIALS = """A material is one function of place for all ways, defined by the voxels of the
     lattice: uniform and smooth ones are interpolated between the middles of voxels, of all others
@@ -32,7 +31,7 @@ def page(study: DiscretisationStudy, tables: dict[str, Table]) -> StudyPage:
         ways[row["material"]].append(row)
     best = [min(rows, key=lambda row: row["solid_median"]) for rows in ways.values()]
     figures = {
-        "unknowns": f"""Rms error of the frequencies of modes {FIRST}–{study.last} against the
+        "unknowns": f"""Rms error of the frequencies of modes 7–{study.last} against the
             solid over the unknowns of the model, a panel a material, a colour a way and a marker a
             solid; both axes are logarithmic.""",
         "seconds": "The same over the wall seconds from the surface to the modes.",

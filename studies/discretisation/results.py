@@ -6,9 +6,6 @@ from typing import Any
 
 from studies.base.cases import Case, CaseResults
 
-SOLID, VOXELS = "solid", "voxels"
-"""References of errors: the solid itself, and its voxels."""
-
 
 class DiscretisationStudy(CaseResults):
     """The folder of the study."""
@@ -31,9 +28,4 @@ class DiscretisationStudy(CaseResults):
 
     def way(self, case: Case, name: str) -> dict[str, Any]:
         """What a way to the spectrum of a case came to."""
-        found: dict[str, Any] = self.ratings[case]["ways"][name]
-        return found
-
-    def rms(self, case: Case, name: str, against: str) -> float:
-        """Rms error of its frequencies."""
-        return float(self.way(case, name)["against"][against]["rms"])
+        return self.ratings[case]["ways"][name]

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.base.cases import CASE_COLUMNS, Case
-from studies.base.conditions import IN_COLUMNS, NOT_TIMED, Repeats, measured
-from studies.base.table import Column, Row, hidden, spread, table
-from studies.discretisation.results import SOLID, VOXELS, DiscretisationStudy
+from studies.base.cases import UNTIMED, Case, case_columns
+from studies.base.conditions import IN_COLUMNS, Repeats, measured
+from studies.base.table import Column, Row, each, hidden, spread, table
+from studies.discretisation.results import DiscretisationStudy
 
-FIRST = 7
-AGAINST = (SOLID, VOXELS)
+AGAINST = {"solid": "Solid", "voxels": "Voxels"}
+"""References of errors, the solid itself and its voxels, for people."""
 WAYS = {
     "voxels": "Voxels",
     "coarse": "DDFEM* of voxels",
@@ -24,47 +24,38 @@ WAYS = {
     "cells": "Finite cells",
 }
 """All ways, for people."""
-PHASES = ("mesh", "material", "model", "solve")
+PHASES = {"mesh": "Mesh", "material": "Material", "model": "Model", "solve": "Solve"}
 
 
 def _repeats(study: DiscretisationStudy) -> Repeats:
     return Repeats(f"{study.runs}, all ways in turn, after one on a small box", IN_COLUMNS)
 
 
-UNTIMED, TIMED = (
-    measured(lambda study: study.records, NOT_TIMED),
-    measured(lambda study: study.records, _repeats),
-)
+TIMED = measured(lambda study: study.records, _repeats)
 
 
 @table(
-    lambda study: (
-        f"""Relative errors of the frequencies of modes {FIRST}–{study.last}, modes matched by
-        index, against the solid itself and against its voxels: root mean square over all
-        solids, each weighing the same, rms of the median solid, and the worst single frequency,
-        negative if too low. Unknowns and wall time are those of the median solid, over those of
-        its voxels. The doubt is the error that the truth itself may have."""
+    Column("material", "Material"),
+    Column("way", "Way"),
+    each(
+        AGAINST,
+        Column("{name}_rms", "{label}, rms", "percent"),
+        Column("{name}_median", "median", "percent"),
+        Column("{name}_worst", "worst", "percent"),
+        hidden("{name}_where", "at"),
     ),
-    [
-        Column("material", "Material"),
-        Column("way", "Way"),
-        Column("solid_rms", "Solid, rms", "percent"),
-        Column("solid_median", "median", "percent"),
-        Column("solid_worst", "worst", "percent"),
-        hidden("solid_where", "at"),
-        Column("voxels_rms", "Voxels, rms", "percent"),
-        Column("voxels_median", "median", "percent"),
-        Column("voxels_worst", "worst", "percent"),
-        hidden("voxels_where", "at"),
-        Column("n_dofs", "Unknowns over voxels’", "score"),
-        Column("seconds", "Time over voxels’", "score"),
-        Column("doubt", "Doubt", "percent"),
-    ],
+    Column("n_dofs", "Unknowns over voxels’", "score"),
+    Column("seconds", "Time over voxels’", "score"),
+    Column("doubt", "Doubt", "percent"),
     keys="material way",
     conditions=TIMED,
 )
 def summary(study: DiscretisationStudy) -> Iterator[Row]:
-    """Errors by material and way over all solids, and what they cost beside the voxels."""
+    """Relative errors of the frequencies of modes 7–{last}, modes matched by index, against the
+    solid itself and against its voxels: root mean square over all solids, each weighing the same,
+    rms of the median solid, and the worst single frequency, negative if too low. Unknowns and wall
+    time are those of the median solid, over those of its voxels. The doubt is the error that the
+    truth itself may have."""
     for material in study.part["materials"]:
         cases = [case for case in study.ratings if case.material == material]
         for name in study.ways_of(cases[0]):
@@ -98,43 +89,26 @@ def _root_mean_square(values: list[float]) -> float:
 
 
 @table(
-    lambda study: (
-        f"""Relative errors of the frequencies of modes {FIRST}–{study.last}, modes matched by
-        index, against the solid itself and against its voxels. Seconds are wall time from the
-        surface to the modes: mesh, moduli of its voxels by the material, model, and modes to
-        {next(iter(study.ratings.values()))["tolerance"]:g}, the coarsening and, of the
-        refined model, all its steps included; median, least and greatest of the runs."""
+    case_columns("title material"),
+    hidden("name", "Name"),
+    Column("way", "Way"),
+    Column("unknowns", "Unknowns", "count", source="n_dofs"),
+    each(
+        AGAINST,
+        Column("{name}_rms", "{label}, rms", "percent", source="against.{name}.rms"),
+        Column("{name}_worst", "worst", "percent", source="against.{name}.worst"),
+        hidden("{name}_mode", "at mode", "count", source="against.{name}.worst_mode"),
     ),
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        hidden("resolution", "Resolution", "count"),
-        Column("material", "Material"),
-        hidden("name", "Name"),
-        Column("way", "Way"),
-        Column("unknowns", "Unknowns", "count", source="n_dofs"),
-        Column("solid_rms", "Solid, rms", "percent", source="against.solid.rms"),
-        Column("solid_worst", "worst", "percent", source="against.solid.worst"),
-        hidden("solid_mode", "at mode", "count", source="against.solid.worst_mode"),
-        Column("voxels_rms", "Voxels, rms", "percent", source="against.voxels.rms"),
-        Column("voxels_worst", "worst", "percent", source="against.voxels.worst"),
-        hidden("voxels_mode", "at mode", "count", source="against.voxels.worst_mode"),
-        *spread("seconds", "Time", "seconds"),
-        *(
-            column
-            for phase in PHASES
-            for column in (
-                hidden(
-                    f"{phase}_seconds", f"{phase.capitalize()}", "seconds", source=f"phases.{phase}"
-                ),
-            )
-        ),
-    ],
+    spread("seconds", "Time", "seconds"),
+    each(PHASES, hidden("{name}_seconds", "{label}", "seconds", source="phases.{name}")),
     keys="model resolution material name",
     conditions=TIMED,
 )
 def cases(study: DiscretisationStudy) -> Iterator[Row]:
-    """Errors, unknowns and wall time of every way in every case."""
+    """Relative errors of the frequencies of modes 7–{last}, modes matched by index, against the
+    solid itself and against its voxels. Seconds are wall time from the surface to the modes: mesh,
+    moduli of its voxels by the material, model, and modes to {first[tolerance]:g}, the coarsening
+    and, of the refined model, all its steps included; median, least and greatest of the runs."""
     for case in study.ratings:
         for name in study.ways_of(case):
             way = study.way(case, name)
@@ -143,21 +117,16 @@ def cases(study: DiscretisationStudy) -> Iterator[Row]:
 
 
 @table(
-    lambda study: (
-        f"""Frequencies of the solids themselves are those of finite cells on a lattice twice as
-        fine, less half of what may be left of the difference from finite cells on the lattice
-        of the voxels; the doubt is as much: rms and largest over modes {FIRST}–{study.last}."""
-    ),
-    [
-        *CASE_COLUMNS,
-        Column("unknowns", "Unknowns", "count", source="n_dofs"),
-        Column("doubt_rms", "Doubt, rms", "percent"),
-        Column("doubt_worst", "largest", "percent"),
-    ],
+    case_columns(),
+    Column("unknowns", "Unknowns", "count", source="n_dofs"),
+    Column("doubt_rms", "Doubt, rms", "percent"),
+    Column("doubt_worst", "largest", "percent"),
     keys="model resolution material",
     conditions=UNTIMED,
 )
 def truths(study: DiscretisationStudy) -> Iterator[Row]:
-    """What is known of the solid itself in every case."""
+    """Frequencies of the solids themselves are those of finite cells on a lattice twice as fine,
+    less half of what may be left of the difference from finite cells on the lattice of the voxels;
+    the doubt is as much: rms and largest over modes 7–{last}."""
     for case, rating in study.ratings.items():
         yield {**rating["truth"], **study.identity(case)}

@@ -17,16 +17,14 @@ MICRO, NANO, MEGA = 1e-6, 1e-9, 1e6
 
 
 @table(
-    lambda study: (
+    hidden("key", "Key"),
+    Column("quantity", "Quantity"),
+    Column("value", "Value"),
+    hidden("value_kind", "Its kind"),
+    caption=lambda study: (
         f"""The forests studied ({study.model["path"]}): objective {study.model["objective"]},
         Poisson’s ratio {study.model["poisson"]:g}. Held-out blocks were not used in training."""
     ),
-    [
-        hidden("key", "Key"),
-        Column("quantity", "Quantity"),
-        Column("value", "Value"),
-        hidden("value_kind", "Its kind"),
-    ],
 )
 def model(study: ForestsStudy) -> Iterator[Row]:
     """Size and held-out scores of the forests studied."""
@@ -34,29 +32,27 @@ def model(study: ForestsStudy) -> Iterator[Row]:
 
 
 @table(
-    lambda results: (
+    Column("blocks", "Blocks"),
+    Column("method", "Coarsening"),
+    Column("mean_error", "Nodal, mean", "small"),
+    Column("median_error", "median", "small"),
+    Column("mean_error_inertial", "Inertia, mean", "small"),
+    Column("median_error_inertial", "median", "small"),
+    Column("mean_error_corner", "Corner, mean", "small"),
+    Column("median_error_corner", "median", "small"),
+    Column("mean_squared_m2", "Nodal, absolute [m²]", "small", "m^2"),
+    Column("seconds_per_block", "Cost per block", "seconds"),
+    Column("seconds_per_block_min", "min", "seconds"),
+    Column("seconds_per_block_max", "max", "seconds"),
+    Column("storage_bytes", "Storage", "bytes"),
+    Column("training_seconds", "Made in", "seconds"),
+    keys="blocks method",
+    conditions=MEASURED,
+    caption=lambda results: (
         f"""Every coarsening on {on_blocks(results)[0]["blocks"]:,} random blocks of each kind,
         on one core; costs are medians. Errors: {MEASURE} Corner: forces on the corners only.
         Databases beyond the range that they were made for take their stiffest material."""
     ),
-    [
-        Column("blocks", "Blocks"),
-        Column("method", "Coarsening"),
-        Column("mean_error", "Nodal, mean", "small"),
-        Column("median_error", "median", "small"),
-        Column("mean_error_inertial", "Inertia, mean", "small"),
-        Column("median_error_inertial", "median", "small"),
-        Column("mean_error_corner", "Corner, mean", "small"),
-        Column("median_error_corner", "median", "small"),
-        Column("mean_squared_m2", "Nodal, absolute [m²]", "small", "m^2"),
-        Column("seconds_per_block", "Cost per block", "seconds"),
-        Column("seconds_per_block_min", "min", "seconds"),
-        Column("seconds_per_block_max", "max", "seconds"),
-        Column("storage_bytes", "Storage", "bytes"),
-        Column("training_seconds", "Made in", "seconds"),
-    ],
-    keys="blocks method",
-    conditions=MEASURED,
 )
 def every_block(results: Any) -> Iterator[Row]:
     """All that `forests table` found, row by row."""
@@ -95,43 +91,37 @@ def _measured(part: str, repeats: Any, **said: str) -> Any:
 
 
 @table(
-    """Ways to train, on the same rows and with the same storage, so little that all fill it;
-    “the same” refers to the training of the default forests. Scores are on fresh blocks that no
-    training has seen, by distribution of their moduli: rms of the error of log E over solid and
-    over partly void blocks, median relative error of a modulus E, and R² of log E; all against
-    the fit that is learned.""",
-    lambda study: [
-        Column("variant", "Training"),
-        Column("training_rows", "Rows trained on", "count"),
-        Column("leaves", "Leaves", "count"),
-        Column("storage_bytes", "Storage", "bytes"),
-        Column("training_seconds", "Training", "seconds"),
-        *_scores(study, "variants"),
-    ],
+    Column("variant", "Training"),
+    Column("training_rows", "Rows trained on", "count"),
+    Column("leaves", "Leaves", "count"),
+    Column("storage_bytes", "Storage", "bytes"),
+    Column("training_seconds", "Training", "seconds"),
+    lambda study: _scores(study, "variants"),
     conditions=_measured("variants", ONE_COLD_RUN),
 )
 def variants(study: ForestsStudy) -> Iterator[Row]:
-    """Ways to train."""
+    """Ways to train, on the same rows and with the same storage, so little that all fill it; “the
+    same” refers to the training of the default forests. Scores are on fresh blocks that no training
+    has seen, by distribution of their moduli: rms of the error of log E over solid and over partly
+    void blocks, median relative error of a modulus E, and R² of log E; all against the fit that is
+    learned."""
     return _trainings(study, "variants")
 
 
 @table(
-    """The same training on more and more rows, eight to a block. Scores are on fresh blocks
-    that no training has seen, by distribution of their moduli: rms of the error of log E over
-    solid and over partly void blocks, median relative error of a modulus E, and R² of log E;
-    all against the fit that is learned.""",
-    lambda study: [
-        Column("rows", "Rows", "count"),
-        hidden("training_rows", "Rows trained on", "count"),
-        Column("leaves", "Leaves", "count"),
-        Column("storage_bytes", "Storage", "bytes"),
-        Column("training_seconds", "Training", "seconds"),
-        *_scores(study, "curve"),
-    ],
+    Column("rows", "Rows", "count"),
+    hidden("training_rows", "Rows trained on", "count"),
+    Column("leaves", "Leaves", "count"),
+    Column("storage_bytes", "Storage", "bytes"),
+    Column("training_seconds", "Training", "seconds"),
+    lambda study: _scores(study, "curve"),
     conditions=_measured("curve", ONE_COLD_RUN),
 )
 def curve(study: ForestsStudy) -> Iterator[Row]:
-    """Learning curve."""
+    """The same training on more and more rows, eight to a block. Scores are on fresh blocks that no
+    training has seen, by distribution of their moduli: rms of the error of log E over solid and
+    over partly void blocks, median relative error of a modulus E, and R² of log E; all against the
+    fit that is learned."""
     return _trainings(study, "curve")
 
 
@@ -163,12 +153,10 @@ def _cost_caption(study: ForestsStudy) -> str:
 
 
 @table(
-    _cost_caption,
-    [
-        Column("evaluation", "Evaluation"),
-        *spread("seconds", "Median", "seconds"),
-    ],
+    Column("evaluation", "Evaluation"),
+    spread("seconds", "Median", "seconds"),
     conditions=_measured("benchmark", _repeats, threads="as the row says"),
+    caption=_cost_caption,
 )
 def cost(study: ForestsStudy) -> Iterator[Row]:
     """Time of a block by each evaluation, and by scikit-learn's."""
@@ -184,22 +172,19 @@ def cost(study: ForestsStudy) -> Iterator[Row]:
 
 
 @table(
-    """Wall time of a block on one core by forests of complete trees, for random blocks and for
-    those of a mesh, whose neighbours are alike; a walk is that of one origin down one tree.""",
-    [
-        Column("bytes", "Storage", "bytes"),
-        Column("trees", "Trees of each forest", "count"),
-        Column("depth", "Depth", "count"),
-        *spread("random", "Random blocks", "seconds", shown=False),
-        Column("random_walk", "a walk", "seconds"),
-        *spread("coherent", "Blocks of a mesh", "seconds", shown=False),
-        Column("coherent_walk", "a walk", "seconds"),
-    ],
+    Column("bytes", "Storage", "bytes"),
+    Column("trees", "Trees of each forest", "count"),
+    Column("depth", "Depth", "count"),
+    spread("random", "Random blocks", "seconds", shown=False),
+    Column("random_walk", "a walk", "seconds"),
+    spread("coherent", "Blocks of a mesh", "seconds", shown=False),
+    Column("coherent_walk", "a walk", "seconds"),
     keys="trees depth",
     conditions=_measured("benchmark", _repeats, threads="1"),
 )
 def sizes(study: ForestsStudy) -> Iterator[Row]:
-    """Time of a block over the size of forests."""
+    """Wall time of a block on one core by forests of complete trees, for random blocks and for
+    those of a mesh, whose neighbours are alike; a walk is that of one origin down one tree."""
     for size in study.result("benchmark")["sizes"]:
         row = {"bytes": MEGA * size["megabytes"], "trees": size["trees"], "depth": size["depth"]}
         for kind in ("random", "coherent"):

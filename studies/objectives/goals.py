@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, starmap
 
 from solver.coarsening.forest import FOREST
-from studies.base.cases import CASE_COLUMNS, Case
+from studies.base.cases import Case, case_columns
 from studies.base.results import spelt
 from studies.base.table import Column, Row, hidden, table
-from studies.objectives.results import FIRST, Objectives
+from studies.objectives.results import Objectives
 
 NBSP = "\N{NO-BREAK SPACE}"
 LABELS = {
@@ -113,19 +114,13 @@ def _columns(index: int, goal: Goal) -> tuple[Column, ...]:
 
 
 @table(
-    lambda study: (
-        f"""Goals on modes {FIRST}–{study.last("audible")}: the largest value among the cases
-        that a goal is about, and whether all of them keep the limit. A goal of the forests says
-        nothing of the fits."""
-    ),
-    lambda study: [
-        Column("coarsening", "Objective"),
-        Column("met", "Goals met"),
-        *(column for index, goal in enumerate(goals_of(study)) for column in _columns(index, goal)),
-    ],
+    Column("coarsening", "Objective"),
+    Column("met", "Goals met"),
+    lambda study: chain.from_iterable(starmap(_columns, enumerate(goals_of(study)))),
 )
 def goals(study: Objectives) -> Iterator[Row]:
-    """Goals met and missed by every objective."""
+    """Goals on modes 7–{last[audible]}: the largest value among the cases that a goal is about, and
+    whether all of them keep the limit. A goal of the forests says nothing of the fits."""
     for coarsening in study.coarsenings:
         verdicts = [(goal, judge(study, goal, coarsening)) for goal in goals_of(study)]
         judged = [verdict for _, verdict in verdicts if verdict.cases]
@@ -142,20 +137,13 @@ def goals(study: Objectives) -> Iterator[Row]:
 
 
 @table(
-    """Every case that a goal is about: the limit, and the value of each objective.""",
-    lambda study: [
-        Column("goal", "Goal"),
-        *CASE_COLUMNS,
-        Column("limit", "Limit", "percent"),
-        *(
-            column
-            for name in study.coarsenings
-            for column in (Column(f"{name}", f"{name}", "percent"),)
-        ),
-    ],
+    Column("goal", "Goal"),
+    case_columns(),
+    Column("limit", "Limit", "percent"),
+    lambda study: [Column(name, name, "percent") for name in study.coarsenings],
 )
 def goal_cases(study: Objectives) -> Iterator[Row]:
-    """Every case of every goal."""
+    """Every case that a goal is about: the limit, and the value of each objective."""
     for goal in goals_of(study):
         for case in goal.cases(study):
             values = {name: goal.value(study, case, name) for name in study.coarsenings}

@@ -12,7 +12,7 @@ from studies.base.page import Section, StudyPage, origins, section
 from studies.base.parts import grid, html, prose
 from studies.base.table import Table
 from studies.objectives.goals import rms_limits
-from studies.objectives.results import FIRST, Objectives
+from studies.objectives.results import Objectives
 
 Tables = dict[str, Table]
 
@@ -58,7 +58,7 @@ def _verdict(study: Objectives, tables: Tables) -> Section:
     rows = {row["coarsening"]: row for row in tables["summary"].rows}
     best = next(row for name, row in rows.items() if name != FOREST)
     (goals,) = tables["goals"].having({"coarsening": best["coarsening"]})
-    say = partial(html, best=best, rows=rows, span=f"{FIRST}–{study.last('audible')}")
+    say = partial(html, best=best, rows=rows, span=f"7–{study.last['audible']}")
     fewer = "; ".join(shortened(study))
     return section(
         "verdict",
@@ -137,7 +137,7 @@ def _figure(study: Objectives, solid: str) -> Markup:
         parts.element("h3", study.titles[solid]),
         study.drawn(solid),
         caption=f"""Root mean square of the relative frequency errors of modes
-            {FIRST}–{study.last("audible")} by objective, one marker a material; filled at
+            7–{study.last["audible"]} by objective, one marker a material; filled at
             resolution {max(resolutions)}{hollow}. The axis is logarithmic{goal}.""",
         class_="plot",
         id=f"plot-{solid}",

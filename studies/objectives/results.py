@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from carillon.fem.model import RIGID_MODES
 from solver.coarsening.forest import FOREST
 from studies.base.cases import Case, CaseResults
-
-FIRST = RIGID_MODES + 1
 
 
 class Objectives(CaseResults):
@@ -19,32 +16,27 @@ class Objectives(CaseResults):
     @property
     def coarsenings(self) -> list[str]:
         """Names of the objectives and the baselines."""
-        return [row["coarsening"] for row in self._any["rows"]]
+        return [row["coarsening"] for row in self.first["rows"]]
 
     @property
     def forest(self) -> dict[str, str] | None:
         """Which forests are compared: `forest`, `forest_objective`, `forest_sha256`; or None."""
-        return self._any.get("forest")
+        return self.first.get("forest")
 
     @property
     def without_forest(self) -> str:
         """One sentence about why no forests are among the coarsenings; empty if they are."""
-        return self._any.get("without_forest", "")
+        return self.first.get("without_forest", "")
 
     @property
-    def _any(self) -> dict[str, Any]:
-        """The first case, for what is the same in all of them."""
-        return next(iter(self.ratings.values()))
-
-    def last(self, part: str) -> int:
-        """Last mode compared: of the `audible` 7..60, or of `all`; earlier if fewer were wanted."""
-        rows = (row for rating in self.ratings.values() for row in rating["rows"])
-        return max(row[part]["last"] for row in rows)
+    def last(self) -> dict[str, int]:
+        """Last mode compared: of the `audible` 7..60, and of `all`; or fewer."""
+        rows = [row for rating in self.ratings.values() for row in rating["rows"]]
+        return {part: max(row[part]["last"] for row in rows) for part in ("audible", "all")}
 
     def errors(self, case: Case, coarsening: str) -> dict[str, Any]:
         """Row of a case that belongs to a coarsening."""
-        rows: list[dict[str, Any]] = self.ratings[case]["rows"]
-        return next(row for row in rows if row["coarsening"] == coarsening)
+        return next(r for r in self.ratings[case]["rows"] if r["coarsening"] == coarsening)
 
     def rms(self, case: Case, coarsening: str) -> float:
         """Root mean square of the errors of modes 7..60."""

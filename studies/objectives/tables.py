@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import inspect
 import statistics
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
-import pandas as pd
 
 import carillon.fem.materials
 from dataset_gen.objectives.fitting import module_of
 from solver.coarsening.forest import FOREST
-from studies.base.cases import ALL, CASE_COLUMNS, Case, error_columns, truths_of
-from studies.base.table import Column, Row, Tabulation, hidden, table
+from studies.base.cases import Case, case_columns, error_columns, pooled, truths_of
+from studies.base.table import Column, Row, Tabulation, each, hidden, table
 from studies.objectives.goals import goal_cases as goal_cases
 from studies.objectives.goals import goals as goals
-from studies.objectives.results import FIRST, Objectives
+from studies.objectives.results import Objectives
 
 BASELINES = {
     "galerkin": "No fit: the moduli that give the Galerkin projection of the fine stiffness.",
@@ -24,114 +23,71 @@ BASELINES = {
 }
 
 
-def _errors_of(part: str) -> Callable[[Callable[[Objectives], list[Row]]], Tabulation]:
-    """Make a table of a function that pools the errors of a part of the modes."""
+def _errors_of(part: str, name: str) -> Tabulation:
+    """The table of the errors of a part of the modes by objective and material."""
+
+    def rows(study: Objectives) -> list[Row]:
+        errors = {
+            name: {case: study.errors(case, name)[part] for case in study.ratings}
+            for name in study.coarsenings
+        }
+        rows = [{"coarsening": name, **pooled(study, each)} for name, each in errors.items()]
+        return sorted(rows, key=lambda row: row["all_rms"])
+
+    rows.__doc__ = f"""Relative errors of the frequencies of modes 7–{{last[{part}]}} against SLEPc
+        on the fine mesh, modes matched by index, by objective and material: root mean square over
+        all solids and resolutions, each weighing the same, and the worst single frequency, negative
+        if too low. The smallest rms over all materials comes first."""
     return table(
-        lambda study: (
-            f"""Relative errors of the frequencies of modes {FIRST}–{study.last(part)} against
-            SLEPc on the fine mesh, modes matched by index, by objective and material: root mean
-            square over all solids and resolutions, each weighing the same, and the worst single
-            frequency, negative if too low. The smallest rms over all materials comes first."""
-        ),
-        lambda study: [
-            Column("coarsening", "Objective"),
-            *error_columns(study.part["materials"]),
-        ],
-    )
+        Column("coarsening", "Objective"),
+        lambda study: error_columns(study.part["materials"]),
+        name=name,
+    )(rows)
 
 
-@_errors_of("audible")
-def summary(study: Objectives) -> list[Row]:
-    """Errors of modes 7..60 by objective and material."""
-    return _pooled(study, "audible")
-
-
-@_errors_of("all")
-def summary_all(study: Objectives) -> list[Row]:
-    """Errors of all modes by objective and material."""
-    return _pooled(study, "all")
-
-
-def _pooled(study: Objectives, part: str) -> list[Row]:
-    errors = pd.DataFrame(
-        {
-            "coarsening": row["coarsening"],
-            "material": material,
-            "square": row[part]["rms"] ** 2,
-            "worst": row[part]["worst"],
-            "where": f"{study.label(case)}, mode {row[part]['worst_mode']}",
-        }
-        for case, rating in study.ratings.items()
-        for row in rating["rows"]
-        for material in (case.material, ALL)
-    )
-    rows: dict[str, Row] = {name: {"coarsening": name} for name in study.coarsenings}
-    for (name, material), group in errors.groupby(["coarsening", "material"], sort=False):
-        worst = group.loc[group["worst"].abs().idxmax()]
-        rows[name] |= {
-            f"{material}_rms": float(np.sqrt(group["square"].mean())),
-            f"{material}_worst": float(worst["worst"]),
-            f"{material}_where": worst["where"],
-        }
-    return sorted(rows.values(), key=lambda row: row["all_rms"])
+summary, summary_all = _errors_of("audible", "summary"), _errors_of("all", "summary-all")
 
 
 @table(
-    """Relative errors of the frequencies against SLEPc on the fine mesh: root mean square, mean
-    and worst, the last two positive if too high. Times are wall seconds on one core with other
-    jobs beside it: of the fits, equal blocks once, with what each void pattern needs once, and
-    of the coarse model’s modes by SLEPc.""",
-    lambda study: [
-        *CASE_COLUMNS,
-        Column("unknowns", "Unknowns", "count", source="n_dofs"),
-        Column("coarse_unknowns", "coarsened", "count", source="coarse_n_dofs"),
-        Column("coarsening", "Objective"),
-        *(
-            column
-            for part in ("audible", "all")
-            for column in (
-                Column(
-                    f"{part}_rms",
-                    f"Modes {FIRST}–{study.last(part)}, rms",
-                    "percent",
-                    source=f"{part}.rms",
-                ),
-                Column(f"{part}_mean", "mean", "percent", source=f"{part}.mean"),
-                Column(f"{part}_worst", "worst", "percent", source=f"{part}.worst"),
-                Column(f"{part}_worst_mode", "at mode", "count", source=f"{part}.worst_mode"),
-            )
-        ),
-        hidden("last", "Last mode compared", "count", source="all.last"),
-        Column("converged", "Fits converged", "percent"),
-        Column("fit_seconds", "Fits", "seconds"),
-        Column("solve_seconds", "Modes", "seconds"),
-    ],
+    case_columns(),
+    Column("unknowns", "Unknowns", "count", source="n_dofs"),
+    Column("coarse_unknowns", "coarsened", "count", source="coarse_n_dofs"),
+    Column("coarsening", "Objective"),
+    lambda study: each(
+        {part: f"7–{last}" for part, last in study.last.items()},
+        Column("{name}_rms", "Modes {label}, rms", "percent", source="{name}.rms"),
+        Column("{name}_mean", "mean", "percent", source="{name}.mean"),
+        Column("{name}_worst", "worst", "percent", source="{name}.worst"),
+        Column("{name}_worst_mode", "at mode", "count", source="{name}.worst_mode"),
+    ),
+    hidden("last", "Last mode compared", "count", source="all.last"),
+    Column("converged", "Fits converged", "percent"),
+    Column("fit_seconds", "Fits", "seconds"),
+    Column("solve_seconds", "Modes", "seconds"),
 )
 def errors(study: Objectives) -> Iterator[Row]:
-    """Every coarsening of every case."""
+    """Relative errors of the frequencies against SLEPc on the fine mesh: root mean square, mean and
+    worst, the last two positive if too high. Times are wall seconds on one core with other jobs
+    beside it: of the fits, equal blocks once, with what each void pattern needs once, and of the
+    coarse model’s modes by SLEPc."""
     for case, rating in study.ratings.items():
         for row in rating["rows"]:
             yield {**rating, **row, **study.identity(case)}
 
 
 @table(
-    lambda study: (
-        f"""The forests against the fit that they learned, block by block: rms errors of modes
-        {FIRST}–{study.last("audible")} against SLEPc on the fine mesh, pooled over a solid’s
-        resolutions and materials, and the ratio of both, case by case."""
-    ),
-    [
-        Column("title", "Solid"),
-        Column("cases", "Cases", "count"),
-        Column("forest_rms", "Forests, rms", "percent"),
-        Column("fit_rms", "Fit, rms", "percent"),
-        Column("median", "Forests over fit, median", "percent"),
-        Column("worst", "largest", "percent"),
-        Column("where", "at"),
-    ],
+    Column("title", "Solid"),
+    Column("cases", "Cases", "count"),
+    Column("forest_rms", "Forests, rms", "percent"),
+    Column("fit_rms", "Fit, rms", "percent"),
+    Column("median", "Forests over fit, median", "percent"),
+    Column("worst", "largest", "percent"),
+    Column("where", "at"),
 )
 def forest(study: Objectives) -> Iterator[Row]:
-    """Errors of the forests over those of their fit, by solid; no rows without both."""
+    """The forests against the fit that they learned, block by block: rms errors of modes
+    7–{last[audible]} against SLEPc on the fine mesh, pooled over a solid’s resolutions and
+    materials, and the ratio of both, case by case."""
     ratios = {case: study.forest_over_fit(case) for case in study.ratings}
     known = {case: ratio for case, ratio in ratios.items() if ratio is not None}
     if not known:
@@ -162,35 +118,29 @@ def _forest_row(study: Objectives, title: str, ratios: dict[Case, float]) -> Row
 
 
 @table(
-    """Ground truth of every case by SLEPc on the fine mesh: eigenvalues found below a shift μ,
-    and counted there by the inertia of K − μM; wall seconds on one core.""",
-    [
-        *CASE_COLUMNS,
-        Column("unknowns", "Unknowns", "count", source="n_dofs"),
-        Column("coarse_unknowns", "coarsened", "count", source="coarse_n_dofs"),
-        Column("blocks", "Blocks", "count"),
-        Column("distinct_blocks", "distinct", "count"),
-        Column("modes", "Modes", "count"),
-        Column("inertia", "Found / counted"),
-        Column("residual_max", "Largest residual", "small"),
-        Column("orthogonality", "|XᵀMX − I|", "small"),
-        Column("seconds", "Time", "seconds"),
-    ],
+    case_columns(),
+    Column("unknowns", "Unknowns", "count", source="n_dofs"),
+    Column("coarse_unknowns", "coarsened", "count", source="coarse_n_dofs"),
+    Column("blocks", "Blocks", "count"),
+    Column("distinct_blocks", "distinct", "count"),
+    Column("modes", "Modes", "count"),
+    Column("inertia", "Found / counted"),
+    Column("residual_max", "Largest residual", "small"),
+    Column("orthogonality", "|XᵀMX − I|", "small"),
+    Column("seconds", "Time", "seconds"),
 )
 def truths(study: Objectives) -> Iterator[Row]:
-    """Size and proof of every ground truth."""
+    """Ground truth of every case by SLEPc on the fine mesh: eigenvalues found below a shift μ, and
+    counted there by the inertia of K − μM; wall seconds on one core."""
     return truths_of(study)
 
 
 @table(
-    """What is fitted, block by block; the last two coarsen without a fit.""",
-    [
-        Column("coarsening", "Objective"),
-        Column("description", "What it is"),
-    ],
+    Column("coarsening", "Objective"),
+    Column("description", "What it is"),
 )
 def objectives(study: Objectives) -> Iterable[Row]:
-    """What each objective is."""
+    """What is fitted, block by block; the last two coarsen without a fit."""
     return [
         {"coarsening": name, "description": description(name, study.forest)}
         for name in study.coarsenings
@@ -213,14 +163,11 @@ def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str
 
 
 @table(
-    """Young’s modulus from voxel to voxel; Poisson’s ratio and density are the same everywhere.""",
-    [
-        Column("material", "Material"),
-        Column("description", "What it is"),
-    ],
+    Column("material", "Material"),
+    Column("description", "What it is"),
 )
 def materials(study: Objectives) -> Iterable[Row]:
-    """What each material is."""
+    """Young’s modulus from voxel to voxel; Poisson’s ratio and density are the same everywhere."""
     functions = {name: name.replace("-", "_") for name in study.part["materials"]}
     return [
         {"material": name, "description": _first_line(getattr(carillon.fem.materials, function))}

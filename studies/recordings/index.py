@@ -8,7 +8,6 @@ from functools import cached_property
 from statistics import median
 
 from studies.base.conditions import ONE_COLD_RUN, Record, measured
-from studies.base.numbers import show
 from studies.base.page import StudyPage, section
 from studies.base.parts import grid, html, prose, tiles
 from studies.base.results import Results
@@ -50,60 +49,52 @@ class Recordings(Results):
 
 
 @table(
-    lambda index: (
-        f"""What extract finds in every recording. Explained: of the energy from where modes
-        ring freely on; what comes before is a share of the whole clip's. Peaks are those of the
-        spectrum within 40 dB of the loudest and 15 dB above the median of what is around them,
-        from 40 Hz to 0.45 of the sampling rate; missed are those that no mode is within 20
-        cents or half a line of. Processor time is that of the whole command, for a second of
-        sound without its start ({show(index.start_seconds, "seconds")})."""
-    ),
-    [
-        hidden("name", "Recording"),
-        Column("title", "Recording"),
-        Column("kind", "Kind"),
-        Column("tonal", "Tonal"),
-        Column("split", "Split"),
-        Column("seconds", "Length", "seconds"),
-        Column("modes", "Modes", "count"),
-        Column("decibels", "Explained [dB]", "fraction", "dB"),
-        Column("explained", "Explained", "share"),
-        Column("decibels_heard", "From 40 Hz on [dB]", "fraction", "dB"),
-        Column("before", "Before", "share"),
-        Column("peaks", "Strong peaks", "count"),
-        Column("missed", "Missed", "count"),
-        Column("cpu", "Processor time", "seconds"),
-        Column("cpu_rate", "For a second of sound", "seconds"),
-        Column("said", "Refused"),
-    ],
+    hidden("name", "Recording"),
+    Column("title", "Recording"),
+    Column("kind", "Kind"),
+    Column("tonal", "Tonal"),
+    Column("split", "Split"),
+    Column("seconds", "Length", "seconds"),
+    Column("modes", "Modes", "count"),
+    Column("decibels", "Explained [dB]", "fraction", "dB"),
+    Column("explained", "Explained", "share"),
+    Column("decibels_heard", "From 40 Hz on [dB]", "fraction", "dB"),
+    Column("before", "Before", "share"),
+    Column("peaks", "Strong peaks", "count"),
+    Column("missed", "Missed", "count"),
+    Column("cpu", "Processor time", "seconds"),
+    Column("cpu_rate", "For a second of sound", "seconds"),
+    Column("said", "Refused"),
     conditions=MEASURED,
 )
 def clips(index: Recordings) -> Iterator[Row]:
-    """One row for every recording."""
+    """What extract finds in every recording. Explained: of the energy from where modes ring freely
+    on; what comes before is a share of the whole clip's. Peaks are those of the spectrum within 40
+    dB of the loudest and 15 dB above the median of what is around them, from 40 Hz to 0.45 of the
+    sampling rate; missed are those that no mode is within 20 cents or half a line of. Processor
+    time is that of the whole command, for a second of sound without its start
+    ({start_seconds:seconds})."""
     yield from index.summaries
 
 
 @table(
-    """The same by split and kind: medians over the recordings that were not refused, sums of
-    their peaks, and the processor time for a second of sound.""",
-    [
-        Column("split", "Split"),
-        Column("kind", "Kind"),
-        Column("clips", "Recordings", "count"),
-        Column("refused", "Refused", "count"),
-        Column("modes", "Modes, median", "fraction"),
-        Column("decibels", "Explained, median [dB]", "fraction", "dB"),
-        Column("decibels_heard", "from 40 Hz on [dB]", "fraction", "dB"),
-        Column("peaks", "Strong peaks", "count"),
-        Column("missed", "Missed", "count"),
-        Column("cpu_rate", "Processor time, median", "seconds"),
-        Column("cpu_rate_most", "largest", "seconds"),
-    ],
+    Column("split", "Split"),
+    Column("kind", "Kind"),
+    Column("clips", "Recordings", "count"),
+    Column("refused", "Refused", "count"),
+    Column("modes", "Modes, median", "fraction"),
+    Column("decibels", "Explained, median [dB]", "fraction", "dB"),
+    Column("decibels_heard", "from 40 Hz on [dB]", "fraction", "dB"),
+    Column("peaks", "Strong peaks", "count"),
+    Column("missed", "Missed", "count"),
+    Column("cpu_rate", "Processor time, median", "seconds"),
+    Column("cpu_rate_most", "largest", "seconds"),
     keys="split kind",
     conditions=MEASURED,
 )
 def groups(index: Recordings) -> Iterator[Row]:
-    """Medians of all recordings, of each split, and within it of tonal ones and of each kind."""
+    """The same by split and kind: medians over the recordings that were not refused, sums of their
+    peaks, and the processor time for a second of sound."""
     yield _group(ALL, ALL, index.summaries)
     for split in SPLITS:
         rows = [row for row in index.summaries if row["split"] == split]
@@ -114,24 +105,19 @@ def groups(index: Recordings) -> Iterator[Row]:
 
 
 @table(
-    lambda index: (
-        f"""The recording {index.in_formats} in other formats, the channel that is searched: how
-        many of its modes below 8 kHz and within 40 dB of the loudest are found again within a
-        cent, and how far the nearest mode is."""
-    ),
-    [
-        Column("format", "Written as"),
-        Column("modes", "Modes", "count"),
-        Column("strong", "Looked for", "count"),
-        Column("same", "Found again", "count"),
-        Column("median_cents", "Median [cents]", "small", "cents"),
-        Column("worst_cents", "Largest [cents]", "small", "cents"),
-        Column("explained", "Explained", "share"),
-        Column("said", "Refused"),
-    ],
+    Column("format", "Written as"),
+    Column("modes", "Modes", "count"),
+    Column("strong", "Looked for", "count"),
+    Column("same", "Found again", "count"),
+    Column("median_cents", "Median [cents]", "small", "cents"),
+    Column("worst_cents", "Largest [cents]", "small", "cents"),
+    Column("explained", "Explained", "share"),
+    Column("said", "Refused"),
 )
 def formats(index: Recordings) -> list[Row]:
-    """A recording in other formats."""
+    """The recording {in_formats} in other formats, the channel that is searched: how many of its
+    modes below 8 kHz and within 40 dB of the loudest are found again within a cent, and how far the
+    nearest mode is."""
     rows: list[Row] = index.read_json(FORMATS)
     return rows
 

@@ -11,18 +11,15 @@ from studies.recordings.results import RecordingResults
 
 
 @table(
-    """Modes that were found. Levels are those of the amplitudes at the strike, below the
-    largest; the deviation is what the noise of the clip lets the frequency be uncertain by.""",
-    [
-        Column("mode", "Mode", "count"),
-        Column("frequency", "Frequency [Hz]", "hertz"),
-        Column("deviation", "Standard deviation [Hz]", "small", "Hz"),
-        Column("damping", "Damping [1/s]", "fraction", "1/s"),
-        Column("level", "Level [dB]", "fraction", "dB"),
-    ],
+    Column("mode", "Mode", "count"),
+    Column("frequency", "Frequency [Hz]", "hertz"),
+    Column("deviation", "Standard deviation [Hz]", "small", "Hz"),
+    Column("damping", "Damping [1/s]", "fraction", "1/s"),
+    Column("level", "Level [dB]", "fraction", "dB"),
 )
 def modes(results: RecordingResults) -> Iterator[Row]:
-    """The modes that were found, their levels below the loudest one."""
+    """Modes that were found. Levels are those of the amplitudes at the strike, below the largest;
+    the deviation is what the noise of the clip lets the frequency be uncertain by."""
     found = results.found
     amplitudes = np.array(found["amplitudes"][0])
     levels = 20.0 * np.log10(amplitudes / amplitudes.max())
@@ -39,14 +36,11 @@ def modes(results: RecordingResults) -> Iterator[Row]:
 
 
 @table(
-    """Strong peaks of the clip's spectrum that no mode accounts for.""",
-    [
-        Column("frequency", "Frequency [Hz]", "hertz"),
-        Column("level", "Level [dB]", "fraction", "dB"),
-    ],
+    Column("frequency", "Frequency [Hz]", "hertz"),
+    Column("level", "Level [dB]", "fraction", "dB"),
 )
 def missed(results: RecordingResults) -> Iterator[Row]:
-    """Strong peaks that no mode accounts for."""
+    """Strong peaks of the clip's spectrum that no mode accounts for."""
     peaks = results.peaks
     for index in np.flatnonzero(results.missed):
         yield {"frequency": float(peaks.hertz[index]), "level": float(peaks.decibels[index])}

@@ -12,29 +12,26 @@ HARDEST = 5
 
 
 @table(
-    """What every scene holds, what happens in it, and how long the computer worked on it: on
-    bodies, which are modes of meshes and convex parts of all solids, on motion and contacts, on
-    what is heard, and in all, with start, film and page. An impact is as hard as its impulse;
-    full scale of a sound is its loudest sample.""",
-    [
-        hidden("scene", "Scene"),
-        Column("title", "Scene"),
-        Column("objects", "Objects", "count"),
-        Column("modes", "Modes", "count"),
-        Column("impacts", "Impacts", "count"),
-        Column("first", "First impact", "seconds"),
-        Column("hardest", "Hardest impact [N s]", "fraction"),
-        Column("full_scale", "Full scale [dB]", "fraction", "dB", source="full_scale_decibels"),
-        Column("seconds", "Sound", "seconds"),
-        Column("bodies", "Bodies", "seconds", source="timings.bodies"),
-        Column("motion", "Motion", "seconds", source="timings.motion"),
-        Column("contacts", "Contacts", "seconds", source="timings.contacts"),
-        Column("ringing", "Hearing", "seconds", source="timings.sound"),
-        Column("wall", "In all", "seconds"),
-    ],
+    hidden("scene", "Scene"),
+    Column("title", "Scene"),
+    Column("objects", "Objects", "count"),
+    Column("modes", "Modes", "count"),
+    Column("impacts", "Impacts", "count"),
+    Column("first", "First impact", "seconds"),
+    Column("hardest", "Hardest impact [N s]", "fraction"),
+    Column("full_scale", "Full scale [dB]", "fraction", "dB", source="full_scale_decibels"),
+    Column("seconds", "Sound", "seconds"),
+    Column("bodies", "Bodies", "seconds", source="timings.bodies"),
+    Column("motion", "Motion", "seconds", source="timings.motion"),
+    Column("contacts", "Contacts", "seconds", source="timings.contacts"),
+    Column("ringing", "Hearing", "seconds", source="timings.sound"),
+    Column("wall", "In all", "seconds"),
 )
 def scenes(results: Scenes) -> Iterator[Row]:
-    """One row for every scene: what there is, and what happens."""
+    """What every scene holds, what happens in it, and how long the computer worked on it: on
+    bodies, which are modes of meshes and convex parts of all solids, on motion and contacts, on
+    what is heard, and in all, with start, film and page. An impact is as hard as its impulse; full
+    scale of a sound is its loudest sample."""
     for scene in results.scenes:
         struck = [_impact(line) for line in scene.impacts]
         yield {
@@ -49,41 +46,35 @@ def scenes(results: Scenes) -> Iterator[Row]:
 
 
 @table(
-    """Sizes of the files of every scene.""",
-    [
-        hidden("scene", "Scene"),
-        Column("title", "Scene"),
-        Column("out", "Sound, WAV", "bytes"),
-        Column("video", "Film, MP4", "bytes"),
-        Column("gltf", "Motion, GLB", "bytes"),
-        Column("page", "Page", "bytes"),
-        Column("impacts", "Impacts, CSV", "bytes"),
-    ],
+    hidden("scene", "Scene"),
+    Column("title", "Scene"),
+    Column("out", "Sound, WAV", "bytes"),
+    Column("video", "Film, MP4", "bytes"),
+    Column("gltf", "Motion, GLB", "bytes"),
+    Column("page", "Page", "bytes"),
+    Column("impacts", "Impacts, CSV", "bytes"),
 )
 def files(results: Scenes) -> Iterator[Row]:
-    """How large the files of every scene are."""
+    """Sizes of the files of every scene."""
     for scene in results.scenes:
         yield {"scene": scene.example.name, "title": scene.example.title, **scene.sizes}
 
 
 @table(
-    """The hardest impacts: when, what strikes what, the impulse, the speed at which they
-    approach each other, and how long they touch by Hertz.""",
-    [
-        hidden("scene", "Scene"),
-        Column("title", "Scene"),
-        Column("number", "Rank", "count"),
-        Column("seconds", "Time", "seconds"),
-        Column("first", "What"),
-        Column("second", "strikes what"),
-        Column("impulse", "Impulse [N s]", "fraction"),
-        Column("speed", "Approach [m/s]", "fraction", "m/s"),
-        Column("duration", "Contact", "seconds"),
-    ],
+    hidden("scene", "Scene"),
+    Column("title", "Scene"),
+    Column("number", "Rank", "count"),
+    Column("seconds", "Time", "seconds"),
+    Column("first", "What"),
+    Column("second", "strikes what"),
+    Column("impulse", "Impulse [N s]", "fraction"),
+    Column("speed", "Approach [m/s]", "fraction", "m/s"),
+    Column("duration", "Contact", "seconds"),
     keys="scene number",
 )
 def impacts(results: Scenes) -> Iterator[Row]:
-    """The hardest impacts of every scene, the hardest first."""
+    """The hardest impacts: when, what strikes what, the impulse, the speed at which they approach
+    each other, and how long they touch by Hertz."""
     for scene in results.scenes:
         rows = [_impact(line) for line in scene.impacts]
         rows.sort(key=lambda row: -row["impulse"])

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 from studies.base.conditions import IN_COLUMNS, Record, Repeats, measured
-from studies.base.numbers import show
 from studies.base.page import StudyPage, section
 from studies.base.parts import grid, html
 from studies.base.results import Results
@@ -38,30 +37,24 @@ COMPARED = measured(
 
 
 @table(
-    lambda results: (
-        f"""The hybrid optimiser beside its two parts alone on solids whose clips are strikes of
-        a known material, with checks on the fine solid, for
-        {show(results.config["sound"]["compare_seconds"], "count")} s each: medians, smallest
-        and largest values of {results.config["sound"]["compare_seeds"]} seeds. Costs and
-        distances are those of the fine solid. L-BFGS makes no use of its seed, so that its
-        spread is that of the clock."""
-    ),
-    [
-        hidden("example", "Example"),
-        Column("title", "Solid"),
-        Column("method", "Optimiser"),
-        Column("cost_start", "Cost before", "score"),
-        *spread("cost_end", "after", "score"),
-        *spread("fall", "Fall", "share"),
-        *spread("evaluations", "Evaluations", "count"),
-        *spread("fine_rms_cents", "From targets, rms [cents]", "fraction", "cents"),
-        *spread("seconds", "Time", "seconds", shown=False),
-    ],
+    hidden("example", "Example"),
+    Column("title", "Solid"),
+    Column("method", "Optimiser"),
+    Column("cost_start", "Cost before", "score"),
+    spread("cost_end", "after", "score"),
+    spread("fall", "Fall", "share"),
+    spread("evaluations", "Evaluations", "count"),
+    spread("fine_rms_cents", "From targets, rms [cents]", "fraction", "cents"),
+    spread("seconds", "Time", "seconds", shown=False),
     keys="example method",
     conditions=COMPARED,
 )
 def comparison(results: ComparedSounds) -> Iterator[Row]:
-    """Medians and spreads of every optimiser on every solid."""
+    """The hybrid optimiser beside its two parts alone on solids whose clips are strikes of a known
+    material, with checks on the fine solid, for {config[sound][compare_seconds]:count} s each:
+    medians, smallest and largest values of {config[sound][compare_seeds]} seeds. Costs and
+    distances are those of the fine solid. L-BFGS makes no use of its seed, so that its spread is
+    that of the clock."""
     for name, compared in results.compared.items():
         title = examples(results.config)[name].title
         for row in compared["rows"]:

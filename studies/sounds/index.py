@@ -51,27 +51,24 @@ class OfRecordings(Examples):
 
 
 @table(
-    """Cost before and after the last edit of every example, how far frequencies are from their
-    targets on the coarse and on the fine solid (rms, each with the factor of its moduli that is
-    best), and the largest difference of a frequency.""",
-    [
-        hidden("example", "Example"),
-        Column("title", "Example"),
-        Column("points", "Struck points"),
-        Column("modes", "Modes", "count"),
-        Column("cost_before", "Cost before", "score"),
-        Column("cost", "after", "score"),
-        Column("fall", "Fall", "share"),
-        Column("coarse_cents", "Coarse, rms [cents]", "fraction", "cents"),
-        Column("fine_cents", "Fine, rms [cents]", "fraction", "cents"),
-        Column("fine_bark", "Fine, rms [bark]", "fraction", "bark"),
-        Column("worst", "Largest difference [bark]", "fraction", "bark"),
-        Column("seconds", "Time", "seconds"),
-        Column("per_minute", "Evaluations a minute", "count"),
-    ],
+    hidden("example", "Example"),
+    Column("title", "Example"),
+    Column("points", "Struck points"),
+    Column("modes", "Modes", "count"),
+    Column("cost_before", "Cost before", "score"),
+    Column("cost", "after", "score"),
+    Column("fall", "Fall", "share"),
+    Column("coarse_cents", "Coarse, rms [cents]", "fraction", "cents"),
+    Column("fine_cents", "Fine, rms [cents]", "fraction", "cents"),
+    Column("fine_bark", "Fine, rms [bark]", "fraction", "bark"),
+    Column("worst", "Largest difference [bark]", "fraction", "bark"),
+    Column("seconds", "Time", "seconds"),
+    Column("per_minute", "Evaluations a minute", "count"),
 )
 def sounds(index: Examples) -> Iterator[Row]:
-    """One row for every example: its last edit."""
+    """Cost before and after the last edit of every example, how far frequencies are from their
+    targets on the coarse and on the fine solid (rms, each with the factor of its moduli that is
+    best), and the largest difference of a frequency."""
     for results in index.examples:
         rows = _rows(results, "frequencies")
         near = {row["solid"]: row for row in _rows(results, "nearness")}
@@ -88,25 +85,21 @@ def sounds(index: Examples) -> Iterator[Row]:
 
 
 @table(
-    """How far modes alone sound from the clips, the rms difference of their levels in bands, as
-    the page of each example describes it. Modes designed are those of the clip that were asked
-    for, as a perfect material sounds; all modes of the clip are what the extraction knows of
-    it.""",
-    [
-        hidden("example", "Example"),
-        Column("title", "Example"),
-        Column("point", "Struck point"),
-        Column("silence", "Silence [dB]", "fraction", "dB"),
-        Column("before", "Before [dB]", "fraction", "dB"),
-        Column("after", "After [dB]", "fraction", "dB"),
-        Column("fine", "After, fine model [dB]", "fraction", "dB"),
-        Column("wanted", "Modes designed [dB]", "fraction", "dB"),
-        Column("modes", "All modes of the clip [dB]", "fraction", "dB"),
-    ],
+    hidden("example", "Example"),
+    Column("title", "Example"),
+    Column("point", "Struck point"),
+    Column("silence", "Silence [dB]", "fraction", "dB"),
+    Column("before", "Before [dB]", "fraction", "dB"),
+    Column("after", "After [dB]", "fraction", "dB"),
+    Column("fine", "After, fine model [dB]", "fraction", "dB"),
+    Column("wanted", "Modes designed [dB]", "fraction", "dB"),
+    Column("modes", "All modes of the clip [dB]", "fraction", "dB"),
     keys="example point",
 )
 def distances(index: Examples) -> Iterator[Row]:
-    """How far every example sounds from its clips."""
+    """How far modes alone sound from the clips, the rms difference of their levels in bands, as the
+    page of each example describes it. Modes designed are those of the clip that were asked for, as
+    a perfect material sounds; all modes of the clip are what the extraction knows of it."""
     for results in index.examples:
         for row in _rows(results, "distances"):
             yield {"example": results.example.name, "title": results.example.title, **row}

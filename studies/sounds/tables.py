@@ -41,25 +41,22 @@ COMPARED = measured(lambda results: {"all": results.optimisers["provenance"]}, O
 
 
 @table(
-    """Cost of Eq. 4 before and after the search, on the fine solid where it was checked there,
-    and what is left of its parts without their weights: E_f of the frequencies [bark²] (Eq. 1)
-    and E_a of the amplitudes (Eq. 2). Every edit goes on from the material of the one before.""",
-    [
-        Column("edit", "Edit", "count"),
-        Column("points", "Struck points"),
-        Column("cost_before", "Cost before", "score"),
-        Column("cost", "after", "score"),
-        Column("fall", "Fall", "share"),
-        Column("frequency", "E_f after", "score", "bark^2"),
-        Column("amplitude", "E_a after", "score"),
-        Column("evaluations", "Evaluations", "count"),
-        Column("seconds", "Time", "seconds"),
-        Column("per_minute", "Evaluations a minute", "count"),
-    ],
+    Column("edit", "Edit", "count"),
+    Column("points", "Struck points"),
+    Column("cost_before", "Cost before", "score"),
+    Column("cost", "after", "score"),
+    Column("fall", "Fall", "share"),
+    Column("frequency", "E_f after", "score", "bark^2"),
+    Column("amplitude", "E_a after", "score"),
+    Column("evaluations", "Evaluations", "count"),
+    Column("seconds", "Time", "seconds"),
+    Column("per_minute", "Evaluations a minute", "count"),
     conditions=DESIGNED,
 )
 def designs(results: SoundResults) -> Iterator[Row]:
-    """Cost before and after every edit, and how long it took."""
+    """Cost of Eq. 4 before and after the search, on the fine solid where it was checked there, and
+    what is left of its parts without their weights: E_f of the frequencies [bark²] (Eq. 1) and E_a
+    of the amplitudes (Eq. 2). Every edit goes on from the material of the one before."""
     for number, part in enumerate(results.example.parts, 1):
         last, evidence = results.history(part)[-1], results.designs[part].evidence
         # Not of the history, which has what the coarse solid foretold.
@@ -79,21 +76,18 @@ def designs(results: SoundResults) -> Iterator[Row]:
 
 
 @table(
-    """Frequencies of the elastic modes, on the fine solid where the search was checked there. A
-    factor common to all moduli brings them nearest to the targets, by least squares of cents.
-    Differences are in bark, critical bands of hearing.""",
-    [
-        Column("mode", "Mode", "count"),
-        Column("target", "Target [Hz]", "hertz"),
-        Column("start", "Before [Hz]", "hertz"),
-        Column("start_bark", "difference [bark]", "fraction", "bark"),
-        Column("found", "After [Hz]", "hertz"),
-        Column("found_bark", "difference [bark]", "fraction", "bark"),
-        Column("damping", "Damping [1/s]", "fraction", "1/s"),
-    ],
+    Column("mode", "Mode", "count"),
+    Column("target", "Target [Hz]", "hertz"),
+    Column("start", "Before [Hz]", "hertz"),
+    Column("start_bark", "difference [bark]", "fraction", "bark"),
+    Column("found", "After [Hz]", "hertz"),
+    Column("found_bark", "difference [bark]", "fraction", "bark"),
+    Column("damping", "Damping [1/s]", "fraction", "1/s"),
 )
 def frequencies(results: SoundResults) -> Iterator[Row]:
-    """Target frequencies, and those before and after, mode by mode."""
+    """Frequencies of the elastic modes, on the fine solid where the search was checked there. A
+    factor common to all moduli brings them nearest to the targets, by least squares of cents.
+    Differences are in bark, critical bands of hearing."""
     targets = results.design.targets
     return _by_mode(
         target=targets.frequencies,
@@ -106,19 +100,17 @@ def frequencies(results: SoundResults) -> Iterator[Row]:
 
 
 @table(
-    lambda results: (
+    Column("mode", "Mode", "count"),
+    Column("target", "Target [Hz]", "hertz"),
+    Column("found", "Coarse model [Hz]", "hertz"),
+    Column("truth", "Fine model [Hz]", "hertz"),
+    Column("error", "Coarse from fine", "percent"),
+    Column("bark", "Fine from target [bark]", "fraction", "bark"),
+    caption=lambda results: (
         f"""The same material on all {f"{results.truth.mesh.n_cells:,}"} voxels, solved by
         SLEPc: what the coarse model of {f"{results.design.model.mesh.n_cells:,}"} cells, on
         which the material was sought, errs by, and how far the fine model is from the targets."""
     ),
-    [
-        Column("mode", "Mode", "count"),
-        Column("target", "Target [Hz]", "hertz"),
-        Column("found", "Coarse model [Hz]", "hertz"),
-        Column("truth", "Fine model [Hz]", "hertz"),
-        Column("error", "Coarse from fine", "percent"),
-        Column("bark", "Fine from target [bark]", "fraction", "bark"),
-    ],
 )
 def truth(results: SoundResults) -> Iterator[Row]:
     """What the fine model with the same material sounds at."""
@@ -134,19 +126,16 @@ def truth(results: SoundResults) -> Iterator[Row]:
 
 
 @table(
-    """How far the frequencies of all modes are from their targets: each solid with the factor
-    of its moduli that is best for it, by least squares of cents.""",
-    [
-        hidden("solid", "Solid"),
-        Column("title", "Solid"),
-        Column("rms_cents", "Rms [cents]", "fraction", "cents"),
-        Column("worst_cents", "Largest [cents]", "fraction", "cents"),
-        Column("rms_bark", "Rms [bark]", "fraction", "bark"),
-        Column("worst_bark", "Largest [bark]", "fraction", "bark"),
-    ],
+    hidden("solid", "Solid"),
+    Column("title", "Solid"),
+    Column("rms_cents", "Rms [cents]", "fraction", "cents"),
+    Column("worst_cents", "Largest [cents]", "fraction", "cents"),
+    Column("rms_bark", "Rms [bark]", "fraction", "bark"),
+    Column("worst_bark", "Largest [bark]", "fraction", "bark"),
 )
 def nearness(results: SoundResults) -> Iterator[Row]:
-    """How far all frequencies are from their targets, with the factor that is best for them."""
+    """How far the frequencies of all modes are from their targets: each solid with the factor of
+    its moduli that is best for it, by least squares of cents."""
     design, targets = results.design, results.design.targets.frequencies
     solved = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
     states = {
@@ -168,22 +157,20 @@ def nearness(results: SoundResults) -> Iterator[Row]:
 
 
 @table(
-    lambda results: (
+    Column("point", "Struck point"),
+    Column("silence", "Silence [dB]", "fraction", "dB"),
+    Column("before", "Before [dB]", "fraction", "dB"),
+    Column("after", "After [dB]", "fraction", "dB"),
+    Column("fine", "After, fine model [dB]", "fraction", "dB"),
+    Column("wanted", "Modes designed [dB]", "fraction", "dB"),
+    Column("modes", "All modes of the clip [dB]", "fraction", "dB"),
+    caption=lambda results: (
         f"""How far modes alone sound from the clip, from where its modes ring freely on: rms
         difference of the levels in third-octave bands from 100 Hz to 16 kHz, in windows of 23
         ms, down to {show(abs(spectral_distance.FLOOR_DECIBELS), "count")} dB below the loudest.
         Modes designed are those of the clip that were asked for, as a perfect material sounds;
         all modes of the clip are what the extraction knows of it; silence is at the floor."""
     ),
-    [
-        Column("point", "Struck point"),
-        Column("silence", "Silence [dB]", "fraction", "dB"),
-        Column("before", "Before [dB]", "fraction", "dB"),
-        Column("after", "After [dB]", "fraction", "dB"),
-        Column("fine", "After, fine model [dB]", "fraction", "dB"),
-        Column("wanted", "Modes designed [dB]", "fraction", "dB"),
-        Column("modes", "All modes of the clip [dB]", "fraction", "dB"),
-    ],
 )
 def distances(results: SoundResults) -> Iterator[Row]:
     """How far modes alone sound from the clip, at every struck point."""
@@ -200,48 +187,39 @@ def distances(results: SoundResults) -> Iterator[Row]:
 
 
 @table(
-    """Checks of the search on the fine solid: how far frequencies are from their targets on the
-    coarse solid and on the fine one, how far the fine ones are from what the search foretold,
-    each with the factor of the moduli that is best for it, and the cost on the fine solid.""",
-    [
-        Column("check", "Check", "count"),
-        Column("seconds", "After", "seconds"),
-        Column("evaluations", "Evaluations", "count"),
-        Column("coarse_rms_cents", "Coarse, rms [cents]", "fraction", "cents"),
-        Column("fine_rms_cents", "Fine, rms [cents]", "fraction", "cents"),
-        Column("foretold_rms_cents", "Foretold [cents]", "fraction", "cents"),
-        Column("cost", "Cost", "score"),
-    ],
+    Column("check", "Check", "count"),
+    Column("seconds", "After", "seconds"),
+    Column("evaluations", "Evaluations", "count"),
+    Column("coarse_rms_cents", "Coarse, rms [cents]", "fraction", "cents"),
+    Column("fine_rms_cents", "Fine, rms [cents]", "fraction", "cents"),
+    Column("foretold_rms_cents", "Foretold [cents]", "fraction", "cents"),
+    Column("cost", "Cost", "score"),
     conditions=DESIGNED,
 )
 def checks(results: SoundResults) -> Iterator[Row]:
-    """What the checks on the fine solid found, one after the other, in the last edit."""
+    """Checks of the search on the fine solid: how far frequencies are from their targets on the
+    coarse solid and on the fine one, how far the fine ones are from what the search foretold, each
+    with the factor of the moduli that is best for it, and the cost on the fine solid."""
     for number, entry in enumerate(results.design.evidence.get("checks", []), 1):
         yield {"check": number, **entry}
 
 
 @table(
-    lambda results: (
-        f"""Which modes the fine solid can have, each relative to the first one: how far above
-        its target the design has it; the least distance of any material that was looked at,
-        none where materials on both sides of the target say that one between them has it; the
-        same of it and its two neighbours, the largest of the three. The first
-        {results.reached["together"]} modes were had together, amplitudes aside. A mode is had
-        within {show(results.reached["had_cents"], "count")} cents. That descents did not find a
-        material is no proof that there is none."""
-    ),
-    [
-        Column("mode", "Mode", "count"),
-        Column("target_hz", "Target [Hz]", "hertz"),
-        Column("cents", "Design [cents]", "fraction", "cents"),
-        Column("alone_cents", "By itself [cents]", "fraction", "cents"),
-        Column("beside_cents", "With neighbours [cents]", "fraction", "cents"),
-        Column("verdict", "Can be had"),
-    ],
+    Column("mode", "Mode", "count"),
+    Column("target_hz", "Target [Hz]", "hertz"),
+    Column("cents", "Design [cents]", "fraction", "cents"),
+    Column("alone_cents", "By itself [cents]", "fraction", "cents"),
+    Column("beside_cents", "With neighbours [cents]", "fraction", "cents"),
+    Column("verdict", "Can be had"),
     conditions=REACHED,
 )
 def reach(results: SoundResults) -> list[Row]:
-    """Which modes the solid can have, to a hundredth of a cent."""
+    """Which modes the fine solid can have, each relative to the first one: how far above its target
+    the design has it; the least distance of any material that was looked at, none where materials
+    on both sides of the target say that one between them has it; the same of it and its two
+    neighbours, the largest of the three. The first {reached[together]} modes were had together,
+    amplitudes aside. A mode is had within {reached[had_cents]:count} cents. That descents did not
+    find a material is no proof that there is none."""
     return [
         {key: round(value, 2) if key.endswith("_cents") else value for key, value in row.items()}
         for row in results.reached["modes"]
@@ -249,19 +227,16 @@ def reach(results: SoundResults) -> list[Row]:
 
 
 @table(
-    """Amplitudes of the modes after a strike along the inward normal, as shares of the loudest
-    mode's at the same point.""",
-    [
-        Column("point", "Struck point"),
-        Column("mode", "Mode", "count"),
-        Column("target", "Target", "score"),
-        Column("start", "Before", "score"),
-        Column("found", "After", "score"),
-    ],
+    Column("point", "Struck point"),
+    Column("mode", "Mode", "count"),
+    Column("target", "Target", "score"),
+    Column("start", "Before", "score"),
+    Column("found", "After", "score"),
     keys="point mode",
 )
 def amplitudes(results: SoundResults) -> Iterator[Row]:
-    """Balance of the modes' amplitudes at every struck point."""
+    """Amplitudes of the modes after a strike along the inward normal, as shares of the loudest
+    mode's at the same point."""
     targets = results.design.targets
     start, after = balance(results.start), balance(results.design)
     target = shares(targets.amplitudes)
@@ -283,43 +258,37 @@ def shares(amplitudes: Array) -> Array:
 
 
 @table(
-    """The hybrid optimiser beside its two parts alone, each from the uniform material and for
-    the same wall time. 90 %: the time in which the cost fell by as much.""",
-    [
-        Column("method", "Optimiser"),
-        Column("cost_start", "Cost before", "score"),
-        Column("cost_end", "after", "score"),
-        Column("fall", "Fall", "share"),
-        Column("seconds_to_90_percent", "90 % after", "seconds"),
-        Column("evaluations", "Evaluations", "count"),
-        Column("evaluations_per_minute", "a minute", "count"),
-        Column("seconds", "Time", "seconds"),
-    ],
+    Column("method", "Optimiser"),
+    Column("cost_start", "Cost before", "score"),
+    Column("cost_end", "after", "score"),
+    Column("fall", "Fall", "share"),
+    Column("seconds_to_90_percent", "90 % after", "seconds"),
+    Column("evaluations", "Evaluations", "count"),
+    Column("evaluations_per_minute", "a minute", "count"),
+    Column("seconds", "Time", "seconds"),
     conditions=COMPARED,
 )
 def optimisers(results: SoundResults) -> Iterator[Row]:
-    """The hybrid optimiser beside its two parts."""
+    """The hybrid optimiser beside its two parts alone, each from the uniform material and for the
+    same wall time. 90 %: the time in which the cost fell by as much."""
     for row in results.optimisers["rows"]:
         yield {**row, "method": METHODS[row["method"]], "fall": row["fall_percent"] / 100.0}
 
 
 @table(
-    """Processor time of one evaluation on one thread, median: cold from nothing, warm from the
-    modes of a material nearby, and warm with the derivatives of all frequencies and amplitudes.
-    Of the warm one, the modal analysis takes the last column.""",
-    [
-        Column("n_dofs", "Unknowns", "count"),
-        Column("modes", "Modes", "count"),
-        Column("coordinates", "Coordinates", "count"),
-        Column("cold_seconds", "Cold", "seconds"),
-        Column("warm_seconds", "Warm", "seconds"),
-        Column("gradient_seconds", "with derivatives", "seconds"),
-        Column("analysis_seconds", "Analysis", "seconds"),
-    ],
+    Column("n_dofs", "Unknowns", "count"),
+    Column("modes", "Modes", "count"),
+    Column("coordinates", "Coordinates", "count"),
+    Column("cold_seconds", "Cold", "seconds"),
+    Column("warm_seconds", "Warm", "seconds"),
+    Column("gradient_seconds", "with derivatives", "seconds"),
+    Column("analysis_seconds", "Analysis", "seconds"),
     conditions=COMPARED,
 )
 def evaluation(results: SoundResults) -> list[Row]:
-    """How long an evaluation takes."""
+    """Processor time of one evaluation on one thread, median: cold from nothing, warm from the
+    modes of a material nearby, and warm with the derivatives of all frequencies and amplitudes. Of
+    the warm one, the modal analysis takes the last column."""
     return [results.optimisers["evaluation"]]
 
 

@@ -75,26 +75,24 @@ def _errors(number: int, kind: str) -> tuple[Column, ...]:
 
 
 @table(
+    Column("method", "Coarsening"),
     lambda results: (
+        column
+        for each in enumerate(kinds_of(compared(on_blocks(results))))
+        for column in _errors(*each)
+    ),
+    Column("seconds_per_block", "Cost per block", "seconds"),
+    Column("seconds_per_block_min", "min", "seconds"),
+    Column("seconds_per_block_max", "max", "seconds"),
+    Column("storage_bytes", "Storage", "bytes"),
+    Column("training_seconds", "Made in", "seconds"),
+    conditions=MEASURED,
+    caption=lambda results: (
         f"""Relative squared displacement error on {on_blocks(results)[0]["blocks"]:,} random
         blocks of each kind, mean over the blocks: {MEASURE} Medians are in the CSV file. A
         database is made for each kind, its storage and time are those of one; cost on one core,
         median."""
     ),
-    lambda results: [
-        Column("method", "Coarsening"),
-        *(
-            column
-            for each in enumerate(kinds_of(compared(on_blocks(results))))
-            for column in _errors(*each)
-        ),
-        Column("seconds_per_block", "Cost per block", "seconds"),
-        Column("seconds_per_block_min", "min", "seconds"),
-        Column("seconds_per_block_max", "max", "seconds"),
-        Column("storage_bytes", "Storage", "bytes"),
-        Column("training_seconds", "Made in", "seconds"),
-    ],
-    conditions=MEASURED,
 )
 def blocks(results: Any) -> Iterator[Row]:
     """One row a coarsening, two columns a kind of blocks.

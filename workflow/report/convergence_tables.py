@@ -37,24 +37,21 @@ MEASURED = measured(
 
 
 @table(
-    """Relative errors of the elastic eigenvalues against the exact ones, by start, acceleration
-    and number of corrections.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("modes", "Modes", "count"),
-        Column("start", "Start"),
-        Column("acceleration", "Corrections"),
-        Column("corrections", "made", "count"),
-        Column("median", "Median error", "percent"),
-        Column("p90", "90 % below", "percent"),
-        Column("max", "Worst", "percent"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("modes", "Modes", "count"),
+    Column("start", "Start"),
+    Column("acceleration", "Corrections"),
+    Column("corrections", "made", "count"),
+    Column("median", "Median error", "percent"),
+    Column("p90", "90 % below", "percent"),
+    Column("max", "Worst", "percent"),
     keys="model start acceleration corrections",
     conditions=MEASURED,
 )
 def convergence(results: Any) -> Iterator[Row]:
-    """Errors of the elastic eigenvalues after each correction."""
+    """Relative errors of the elastic eigenvalues against the exact ones, by start, acceleration and
+    number of corrections."""
     for model, history in results.convergence.items():
         for curve in history["histories"]:
             for step, errors in enumerate(curve["eigenvalue_error"]):

@@ -19,41 +19,38 @@ QUANTITIES = ("cold", "warm", "cold_same", "warm_same", "fine", "error")
 
 
 @table(
-    """What a design solves again for every material, from moduli to modes: coarsening by the
-    forests, and the coarse model to an eigenvalue error of 10⁻², from nothing (cold) and from
-    the modes of a material 5 % apart (warm). SLEPc on the fine mesh is what would be solved
-    instead, SLEPc on the coarse mesh the same problem to the same 10⁻². The error is that of
-    the coarse model, of frequencies 7–60 beside SLEPc on the fine mesh; what the solvers add to
-    it is told in eigenvalues, SLEPc’s in the CSV file. The last column is the speed-up of
-    method auto on the fine mesh, both to 10⁻⁶.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        hidden("resolution", "Voxels along it", "count"),
-        hidden("modes", "Modes", "count"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("coarse_unknowns", "coarsened", "count"),
-        hidden("precompute", "Precomputation", "seconds"),
-        Column("slepc", "SLEPc, fine", "seconds"),
-        Column("slepc_coarse", "SLEPc, coarse", "seconds"),
-        Column("cold_seconds", "Cold", "seconds"),
-        Column("warm_seconds", "Warm", "seconds"),
-        Column("cold", "Speed-up: cold, fine", "times"),
-        Column("warm", "warm, fine", "times"),
-        Column("cold_same", "cold, coarse", "times"),
-        Column("warm_same", "warm, coarse", "times"),
-        Column("error", "Error, rms", "percent"),
-        Column("worst", "worst", "percent"),
-        hidden("average_error", "if averaged", "percent"),
-        Column("solver_error", "Eigenvalue, worst", "percent"),
-        hidden("rival_error", "by SLEPc, coarse", "percent"),
-        Column("fine", "fine mesh", "times"),
-        hidden("fine_error", "Worst eigenvalue", "percent"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    hidden("resolution", "Voxels along it", "count"),
+    hidden("modes", "Modes", "count"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("coarse_unknowns", "coarsened", "count"),
+    hidden("precompute", "Precomputation", "seconds"),
+    Column("slepc", "SLEPc, fine", "seconds"),
+    Column("slepc_coarse", "SLEPc, coarse", "seconds"),
+    Column("cold_seconds", "Cold", "seconds"),
+    Column("warm_seconds", "Warm", "seconds"),
+    Column("cold", "Speed-up: cold, fine", "times"),
+    Column("warm", "warm, fine", "times"),
+    Column("cold_same", "cold, coarse", "times"),
+    Column("warm_same", "warm, coarse", "times"),
+    Column("error", "Error, rms", "percent"),
+    Column("worst", "worst", "percent"),
+    hidden("average_error", "if averaged", "percent"),
+    Column("solver_error", "Eigenvalue, worst", "percent"),
+    hidden("rival_error", "by SLEPc, coarse", "percent"),
+    Column("fine", "fine mesh", "times"),
+    hidden("fine_error", "Worst eigenvalue", "percent"),
     conditions=MEASURED,
 )
 def design(results: Any) -> Iterator[Row]:
-    """One row a solid that a design was timed on: seconds, errors, speed-ups."""
+    """What a design solves again for every material, from moduli to modes: coarsening by the
+    forests, and the coarse model to an eigenvalue error of 10⁻², from nothing (cold) and from the
+    modes of a material 5 % apart (warm). SLEPc on the fine mesh is what would be solved instead,
+    SLEPc on the coarse mesh the same problem to the same 10⁻². The error is that of the coarse
+    model, of frequencies 7–60 beside SLEPc on the fine mesh; what the solvers add to it is told in
+    eigenvalues, SLEPc’s in the CSV file. The last column is the speed-up of method auto on the fine
+    mesh, both to 10⁻⁶."""
     for model, row in results.methods.items():
         seconds = row["seconds"]
         if any(seconds.get(name) is None for name in NEEDED):

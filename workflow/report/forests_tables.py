@@ -16,21 +16,15 @@ SCORES = read_own_yaml(Path(__file__).with_name("scores.yaml"))
 
 
 @table(
-    lambda run: (
-        f"""Training data (objective {run.forests["objective"]}) and forests. Held-out blocks were
-        not used in training. A block is 2×2×2 voxels: solid if the body fills all eight, partly
-        void if one to seven of them are empty, as at the surface; scores of partly void blocks
-        are of these alone."""
-    ),
-    [
-        hidden("key", "Key"),
-        Column("quantity", "Quantity"),
-        Column("value", "Value"),
-        hidden("value_kind", "Its kind"),
-    ],
+    hidden("key", "Key"),
+    Column("quantity", "Quantity"),
+    Column("value", "Value"),
+    hidden("value_kind", "Its kind"),
 )
 def training(run: Run) -> Iterator[Row]:
-    """Counts and held-out scores."""
+    """Training data (objective {forests[objective]}) and forests. Held-out blocks were not used in
+    training. A block is 2×2×2 voxels: solid if the body fills all eight, partly void if one to
+    seven of them are empty, as at the surface; scores of partly void blocks are of these alone."""
     shards = list(run.shards.values())
     if shards:
         sizes = [shard["samples"][1] - shard["samples"][0] for shard in shards]

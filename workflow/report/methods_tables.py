@@ -96,44 +96,36 @@ def _configuration(row: Row) -> str:
 
 
 @table(
-    lambda results: f"""{caption(results)}""",
-    lambda results: [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("modes", "Modes", "count"),
-        Column("dof_fine", "Unknowns", "count"),
-        Column("dof_coarse", "coarsened", "count"),
-        Column("precompute", "Precomputation", "seconds"),
-        *(
-            column
-            for name in timed(results)
-            for column in (Column(f"{name}", f"{METHODS[name]}", "seconds"),)
-        ),
-        Column(
-            "hcms_error", "HCMS, worst eigenvalue", "percent", source="eigenvalue_error.hcms.max"
-        ),
-        Column(
-            "hcms_ec_error", "HCMS + EC, worst", "percent", source="eigenvalue_error.hcms_ec.max"
-        ),
-        Column(
-            "ddfem_error",
-            "DDFEM*, frequencies 7–60",
-            "percent",
-            source="frequency_error.ddfem.rms_7_60",
-        ),
-        Column(
-            "average_error", "Average, 7–60", "percent", source="frequency_error.average.rms_7_60"
-        ),
-        *(
-            column
-            for name in timed(results)
-            for column in (
-                hidden(f"{name}_min", f"{METHODS[name]}, min", "seconds"),
-                hidden(f"{name}_max", f"{METHODS[name]}, max", "seconds"),
-            )
-        ),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("modes", "Modes", "count"),
+    Column("dof_fine", "Unknowns", "count"),
+    Column("dof_coarse", "coarsened", "count"),
+    Column("precompute", "Precomputation", "seconds"),
+    lambda results: (
+        column
+        for name in timed(results)
+        for column in (Column(f"{name}", f"{METHODS[name]}", "seconds"),)
+    ),
+    Column("hcms_error", "HCMS, worst eigenvalue", "percent", source="eigenvalue_error.hcms.max"),
+    Column("hcms_ec_error", "HCMS + EC, worst", "percent", source="eigenvalue_error.hcms_ec.max"),
+    Column(
+        "ddfem_error",
+        "DDFEM*, frequencies 7–60",
+        "percent",
+        source="frequency_error.ddfem.rms_7_60",
+    ),
+    Column("average_error", "Average, 7–60", "percent", source="frequency_error.average.rms_7_60"),
+    lambda results: (
+        column
+        for name in timed(results)
+        for column in (
+            hidden(f"{name}_min", f"{METHODS[name]}, min", "seconds"),
+            hidden(f"{name}_max", f"{METHODS[name]}, max", "seconds"),
+        )
+    ),
     conditions=MEASURED,
+    caption=lambda results: f"""{caption(results)}""",
 )
 def methods(results: Any) -> Iterator[Row]:
     """Fig. 11: a row a solid, a column a method."""
@@ -148,23 +140,20 @@ def methods(results: Any) -> Iterator[Row]:
 
 
 @table(
-    """The same runs one by one: median, least and greatest wall seconds, and errors of the
-    elastic eigenvalues against SLEPc’s of the same operator, fine or coarse.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("method", "Method"),
-        Column("runs", "Runs", "count"),
-        *spread("seconds", "Median", "seconds"),
-        Column("error_median", "Error, median", "percent", source="median"),
-        Column("error_p90", "90 % below", "percent", source="p90"),
-        Column("error_max", "worst", "percent", source="max"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("method", "Method"),
+    Column("runs", "Runs", "count"),
+    spread("seconds", "Median", "seconds"),
+    Column("error_median", "Error, median", "percent", source="median"),
+    Column("error_p90", "90 % below", "percent", source="p90"),
+    Column("error_max", "worst", "percent", source="max"),
     keys="model method",
     conditions=MEASURED,
 )
 def spreads(results: Any) -> Iterator[Row]:
-    """Median, least and greatest time of every method, and its eigenvalue errors."""
+    """The same runs one by one: median, least and greatest wall seconds, and errors of the elastic
+    eigenvalues against SLEPc’s of the same operator, fine or coarse."""
     for model, row in results.methods.items():
         for name in (name for name in METHODS if name in row["spread"]):
             yield {
@@ -179,24 +168,21 @@ def spreads(results: Any) -> Iterator[Row]:
 
 
 @table(
-    """Speed-ups: median time of the base over that of the method. With precomputation, the time
-    of the method includes what the mesh needs before its first solve, partition, sparsity and
-    elimination plan, and that of the base does not; warm and later solves on the mesh need it
-    no more. Min is the fastest run of the base over the slowest of the method, max the other
-    way round.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("method", "Method"),
-        Column("base", "Base"),
-        *spread("ratio", "Speed-up", "times"),
-        *spread("with_precompute", "with precomputation", "times", shown=False),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("method", "Method"),
+    Column("base", "Base"),
+    spread("ratio", "Speed-up", "times"),
+    spread("with_precompute", "with precomputation", "times", shown=False),
     keys="model method base",
     conditions=MEASURED,
 )
 def ratios(results: Any) -> Iterator[Row]:
-    """Speed-ups, each with its base."""
+    """Speed-ups: median time of the base over that of the method. With precomputation, the time of
+    the method includes what the mesh needs before its first solve, partition, sparsity and
+    elimination plan, and that of the base does not; warm and later solves on the mesh need it no
+    more. Min is the fastest run of the base over the slowest of the method, max the other way
+    round."""
     parts = {"ratio": "speedup", "with_precompute": "speedup_with_precompute"}
     for model, row in results.methods.items():
         for method, bases in row["speedup"].items():

@@ -24,30 +24,28 @@ MEASURED = measured(
 
 
 @table(
-    lambda results: (
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("kind", "Scaling"),
+    Column("ranks", "Ranks", "count"),
+    Column("n_dofs", "Unknowns", "count"),
+    Column("subdomains", "Subdomains", "count"),
+    Column("measured", "Measured", "seconds", source="seconds"),
+    hidden("measured_min", "min", "seconds", source="seconds"),
+    Column("measured_max", "slowest", "seconds", source="slowest_seconds"),
+    Column("modelled", "Model", "modelled"),
+    Column("misfit", "Model − measured", "misfit"),
+    Column("note", "Note"),
+    Column("peak_memory", "Peak memory of a rank", "bytes"),
+    keys="model kind ranks",
+    conditions=MEASURED,
+    caption=lambda results: (
         f"""HCMS and error correction over MPI ranks of one core each, from moduli to modes: the
         fastest run, and a model of operations, bytes and messages at rates fitted to the runs
         that do not have more ranks than cores. Strong scaling keeps the solid, weak scaling the
         unknowns of a rank. Model − measured is relative to the measured time.
         {" ".join(fits(results))}"""
     ),
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("kind", "Scaling"),
-        Column("ranks", "Ranks", "count"),
-        Column("n_dofs", "Unknowns", "count"),
-        Column("subdomains", "Subdomains", "count"),
-        Column("measured", "Measured", "seconds", source="seconds"),
-        hidden("measured_min", "min", "seconds", source="seconds"),
-        Column("measured_max", "slowest", "seconds", source="slowest_seconds"),
-        Column("modelled", "Model", "modelled"),
-        Column("misfit", "Model − measured", "misfit"),
-        Column("note", "Note"),
-        Column("peak_memory", "Peak memory of a rank", "bytes"),
-    ],
-    keys="model kind ranks",
-    conditions=MEASURED,
 )
 def scaling(results: Any) -> Iterator[Row]:
     """Wall time over ranks."""

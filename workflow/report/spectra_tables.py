@@ -30,30 +30,27 @@ def _identity(run: Run, model: str) -> Row:
 
 
 @table(
-    """Every solid at a glance. Eigenvalue errors are relative to SLEPc on the fine mesh over
-    all elastic modes; frequency errors of the coarsened mesh are root mean squares over modes
-    7–60, and so is what the fine mesh is expected to be off the solid itself. Times are wall
-    seconds from the moduli to the modes; the speed-up's base is SLEPc. Where coarsening would
-    not have paid, all unknowns are left.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("coarse_unknowns", "coarsened", "count"),
-        Column("modes", "Modes", "count"),
-        Column("hcms_error", "HCMS, worst eigenvalue", "percent"),
-        Column("hcms_ec_error", "HCMS + EC, worst eigenvalue", "percent"),
-        Column("ddfem_error", "DDFEM* + HCMS + EC, frequencies", "percent"),
-        Column("solid_error", "fine mesh from the solid", "percent"),
-        Column("truth_seconds", "SLEPc", "seconds"),
-        Column("fast_seconds", "DDFEM* + HCMS + EC", "seconds"),
-        Column("speed_up", "Speed-up", "times"),
-        hidden("fine_taken", "Why it was not coarsened"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("coarse_unknowns", "coarsened", "count"),
+    Column("modes", "Modes", "count"),
+    Column("hcms_error", "HCMS, worst eigenvalue", "percent"),
+    Column("hcms_ec_error", "HCMS + EC, worst eigenvalue", "percent"),
+    Column("ddfem_error", "DDFEM* + HCMS + EC, frequencies", "percent"),
+    Column("solid_error", "fine mesh from the solid", "percent"),
+    Column("truth_seconds", "SLEPc", "seconds"),
+    Column("fast_seconds", "DDFEM* + HCMS + EC", "seconds"),
+    Column("speed_up", "Speed-up", "times"),
+    hidden("fine_taken", "Why it was not coarsened"),
     conditions=ONE_RUN,
 )
 def summary(run: Run) -> Iterator[Row]:
-    """One row a model: size, accuracy, time."""
+    """Every solid at a glance. Eigenvalue errors are relative to SLEPc on the fine mesh over all
+    elastic modes; frequency errors of the coarsened mesh are root mean squares over modes 7–60, and
+    so is what the fine mesh is expected to be off the solid itself. Times are wall seconds from the
+    moduli to the modes; the speed-up's base is SLEPc. Where coarsening would not have paid, all
+    unknowns are left."""
     for model, spectra in run.spectra.items():
         compared = run.comparisons[model]
         truth = solve_seconds(spectra[TRUTH])
@@ -75,26 +72,23 @@ def summary(run: Run) -> Iterator[Row]:
 
 
 @table(
-    """Natural frequencies [Hz] from the first elastic mode on, and their relative errors
-    against SLEPc on the fine mesh.""",
-    [
-        Column("model", "Solid"),
-        Column("mode", "Mode", "count"),
-        Column("truth", "Ground truth", "hertz"),
-        *(
-            column
-            for variant in SHOWN[1:]
-            for column in (
-                Column(f"{variant}", f"{VARIANTS[variant].label}", "hertz"),
-                Column(f"{variant}_error", "error", "percent"),
-            )
-        ),
-    ],
+    Column("model", "Solid"),
+    Column("mode", "Mode", "count"),
+    Column("truth", "Ground truth", "hertz"),
+    (
+        column
+        for variant in SHOWN[1:]
+        for column in (
+            Column(f"{variant}", f"{VARIANTS[variant].label}", "hertz"),
+            Column(f"{variant}_error", "error", "percent"),
+        )
+    ),
     keys="model mode",
     conditions=UNTIMED,
 )
 def frequencies(run: Run) -> Iterator[Row]:
-    """Frequency of every elastic mode by the variants that are shown, and its error."""
+    """Natural frequencies [Hz] from the first elastic mode on, and their relative errors against
+    SLEPc on the fine mesh."""
     for model, spectra in run.spectra.items():
         shown = run.shown_variants(model)
         count = min(len(spectra[variant].frequencies) for variant in shown)
@@ -105,65 +99,57 @@ def frequencies(run: Run) -> Iterator[Row]:
 
 
 @table(
-    """Distance from SLEPc on the fine mesh: relative errors of eigenvalues over all elastic
-    modes, of frequencies over modes 7–60, and the largest mass-weighted angle between the
-    spaces of modes, clusters taken together; 90° means that modes changed places.""",
-    [
-        Column("model", "Solid"),
-        Column("variant", "Method"),
-        Column(
-            "median", "Eigenvalue, median", "percent", source="eigenvalue_relative_error.median"
-        ),
-        Column("p90", "90 % below", "percent", source="eigenvalue_relative_error.p90"),
-        Column("max", "worst", "percent", source="eigenvalue_relative_error.max"),
-        Column("rms_7_60", "Frequency, rms", "percent", source="frequency_rms_relative_error_7_60"),
-        Column("max_7_60", "worst", "percent", source="frequency_max_relative_error_7_60"),
-        Column("angle", "Largest angle", "angle", source="subspace_angle_max"),
-        Column("compared", "Modes compared", "count", source="modes_compared"),
-    ],
+    Column("model", "Solid"),
+    Column("variant", "Method"),
+    Column("median", "Eigenvalue, median", "percent", source="eigenvalue_relative_error.median"),
+    Column("p90", "90 % below", "percent", source="eigenvalue_relative_error.p90"),
+    Column("max", "worst", "percent", source="eigenvalue_relative_error.max"),
+    Column("rms_7_60", "Frequency, rms", "percent", source="frequency_rms_relative_error_7_60"),
+    Column("max_7_60", "worst", "percent", source="frequency_max_relative_error_7_60"),
+    Column("angle", "Largest angle", "angle", source="subspace_angle_max"),
+    Column("compared", "Modes compared", "count", source="modes_compared"),
     keys="model variant",
     conditions=UNTIMED,
 )
 def errors(run: Run) -> Iterator[Row]:
-    """Distances of every variant from the truth."""
+    """Distance from SLEPc on the fine mesh: relative errors of eigenvalues over all elastic modes,
+    of frequencies over modes 7–60, and the largest mass-weighted angle between the spaces of modes,
+    clusters taken together; 90° means that modes changed places."""
     for model, compared in run.comparisons.items():
         for variant, distances in compared.items():
             yield {**distances, "model": model, "variant": VARIANTS[variant].label}
 
 
 @table(
-    """Relative errors of the frequencies of modes 7–60 after coarsening 2×2×2 voxels to one
-    cell, against SLEPc on the fine mesh. All three solve the coarsened model by HCMS + EC.
-    Blocks that DDFEM* keeps fine are counted among the unknowns of its model; where these are
-    all, the fine solid was solved instead of one that DDFEM* coarsens.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("coarse_unknowns", "coarsened", "count"),
-        *(
-            column
-            for variant, label in COARSENED.items()
-            for column in (
-                Column(
-                    f"{variant}_rms",
-                    f"{label}, rms",
-                    "percent",
-                    source=f"{variant}.frequency_rms_relative_error_7_60",
-                ),
-                Column(
-                    f"{variant}_max",
-                    "worst",
-                    "percent",
-                    source=f"{variant}.frequency_max_relative_error_7_60",
-                ),
-            )
-        ),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("coarse_unknowns", "coarsened", "count"),
+    (
+        column
+        for variant, label in COARSENED.items()
+        for column in (
+            Column(
+                f"{variant}_rms",
+                f"{label}, rms",
+                "percent",
+                source=f"{variant}.frequency_rms_relative_error_7_60",
+            ),
+            Column(
+                f"{variant}_max",
+                "worst",
+                "percent",
+                source=f"{variant}.frequency_max_relative_error_7_60",
+            ),
+        )
+    ),
     conditions=UNTIMED,
 )
 def coarsening(run: Run) -> Iterator[Row]:
-    """What the coarsening alone costs in accuracy."""
+    """Relative errors of the frequencies of modes 7–60 after coarsening 2×2×2 voxels to one cell,
+    against SLEPc on the fine mesh. All three solve the coarsened model by HCMS + EC. Blocks that
+    DDFEM* keeps fine are counted among the unknowns of its model; where these are all, the fine
+    solid was solved instead of one that DDFEM* coarsens."""
     for model, compared in run.comparisons.items():
         if FAST in compared:
             taken = run.fine_taken(model) is not None
@@ -172,28 +158,25 @@ def coarsening(run: Run) -> Iterator[Row]:
 
 
 @table(
-    """Wall seconds of one cold run each, with other runs beside it, from meshed solid and
-    moduli to modes: coarsening, partition, assembly and solution count; voxels and material are
-    precomputation; residuals, inertia and the distance from the solid are found off the clock.
-    Methods that are timed alone, in turns, have a table of their own.""",
-    [
-        hidden("model", "Model"),
-        Column("title", "Solid"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("coarse_unknowns", "coarsened", "count"),
-        Column("precomputation", "Precomputation", "seconds"),
-        Column("truth", "SLEPc (truth)", "seconds"),
-        *(
-            column
-            for variant in TIMED[1:]
-            for column in (Column(f"{variant}", f"{VARIANTS[variant].label}", "seconds"),)
-        ),
-        Column("speed_up", "Speed-up over SLEPc", "times"),
-    ],
+    hidden("model", "Model"),
+    Column("title", "Solid"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("coarse_unknowns", "coarsened", "count"),
+    Column("precomputation", "Precomputation", "seconds"),
+    Column("truth", "SLEPc (truth)", "seconds"),
+    (
+        column
+        for variant in TIMED[1:]
+        for column in (Column(f"{variant}", f"{VARIANTS[variant].label}", "seconds"),)
+    ),
+    Column("speed_up", "Speed-up over SLEPc", "times"),
     conditions=ONE_RUN,
 )
 def times(run: Run) -> Iterator[Row]:
-    """Wall time of every method on every model, as in Fig. 11 of the paper."""
+    """Wall seconds of one cold run each, with other runs beside it, from meshed solid and moduli to
+    modes: coarsening, partition, assembly and solution count; voxels and material are
+    precomputation; residuals, inertia and the distance from the solid are found off the clock.
+    Methods that are timed alone, in turns, have a table of their own."""
     for model, spectra in run.spectra.items():
         timed = [variant for variant in TIMED if variant in spectra]
         seconds = {variant: solve_seconds(spectra[variant]) for variant in timed}
@@ -206,18 +189,15 @@ def times(run: Run) -> Iterator[Row]:
 
 
 @table(
-    """Wall seconds of every phase of every run.""",
-    [
-        Column("model", "Solid"),
-        Column("variant", "Method"),
-        Column("phase", "Phase"),
-        Column("seconds", "Time", "seconds"),
-    ],
+    Column("model", "Solid"),
+    Column("variant", "Method"),
+    Column("phase", "Phase"),
+    Column("seconds", "Time", "seconds"),
     keys="model variant phase",
     conditions=ONE_RUN,
 )
 def phases(run: Run) -> Iterator[Row]:
-    """Wall time by phase of every run."""
+    """Wall seconds of every phase of every run."""
     for model, variant, spectrum in run.solved:
         for phase, seconds in spectrum.attributes["timings"].items():
             label = VARIANTS[variant].label
@@ -225,28 +205,25 @@ def phases(run: Run) -> Iterator[Row]:
 
 
 @table(
-    """What every run proves about itself, from products with its own assembled matrices: the
-    largest 2-norm residual |Kx − λMx| / (λ|Mx|), while validations judge energy residuals. The
-    inertia of K − μM counts the eigenvalues below μ independently of the eigensolver: found
-    equals counted when none is missed. The error estimate is the solver's own, from residuals.""",
-    [
-        Column("model", "Solid"),
-        Column("variant", "Method"),
-        Column("residual_max", "2-norm residual", "small"),
-        Column("orthogonality", "|XᵀMX − I|", "small"),
-        Column("rigid_modes", "Rigid modes", "count"),
-        Column("inertia", "Found / counted"),
-        Column("corrections", "Corrections", "count"),
-        Column("estimate", "Error estimate", "small"),
-        Column("subdomains", "Subdomains", "count"),
-        Column("ranks", "Ranks", "count"),
-        Column("peak_memory_bytes", "Peak memory", "bytes"),
-    ],
+    Column("model", "Solid"),
+    Column("variant", "Method"),
+    Column("residual_max", "2-norm residual", "small"),
+    Column("orthogonality", "|XᵀMX − I|", "small"),
+    Column("rigid_modes", "Rigid modes", "count"),
+    Column("inertia", "Found / counted"),
+    Column("corrections", "Corrections", "count"),
+    Column("estimate", "Error estimate", "small"),
+    Column("subdomains", "Subdomains", "count"),
+    Column("ranks", "Ranks", "count"),
+    Column("peak_memory_bytes", "Peak memory", "bytes"),
     keys="model variant",
     conditions=UNTIMED,
 )
 def evidence(run: Run) -> Iterator[Row]:
-    """Residual, orthogonality, inertia count of every run."""
+    """What every run proves about itself, from products with its own assembled matrices: the
+    largest 2-norm residual |Kx − λMx| / (λ|Mx|), while validations judge energy residuals. The
+    inertia of K − μM counts the eigenvalues below μ independently of the eigensolver: found equals
+    counted when none is missed. The error estimate is the solver's own, from residuals."""
     for model, variant, spectrum in run.solved:
         attributes = spectrum.attributes
         counted = attributes.get("inertia_count", -1)

@@ -15,44 +15,38 @@ from workflow.variants import FROM_SOLID, TRUTH, VARIANTS
 
 
 @table(
-    """Every criterion, what was found, what is required, and where the number lies.""",
-    [
-        Column("group", "Spectrum"),
-        Column("key", "Key"),
-        Column("label", "Criterion"),
-        Column("shown", "Found"),
-        Column("required", "Required"),
-        Column("verdict", "Verdict"),
-        hidden("found", "Raw value"),
-        hidden("limit", "Raw limit"),
-        Column("why", "Why it matters"),
-        Column("source", "Source"),
-    ],
+    Column("group", "Spectrum"),
+    Column("key", "Key"),
+    Column("label", "Criterion"),
+    Column("shown", "Found"),
+    Column("required", "Required"),
+    Column("verdict", "Verdict"),
+    hidden("found", "Raw value"),
+    hidden("limit", "Raw limit"),
+    Column("why", "Why it matters"),
+    Column("source", "Source"),
     keys="group key",
 )
 def criteria(evidence: Evidence) -> list[Row]:
-    """Every criterion with value, limit and verdict."""
+    """Every criterion, what was found, what is required, and where the number lies."""
     return [criterion.row for criterion in judge(evidence)]
 
 
 @table(
-    """Expected distance of the fine mesh's frequencies from those of the solid itself. Voxels
-    are compared with quadratic finite cells on the same lattice; the error of these follows
-    from what modes would lose if cells were larger. Positive: too high.""",
-    [
-        Column("discretisation", "Discretisation"),
-        Column("resolution", "Resolution", "count"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("modes", "Modes"),
-        Column("rms", "Distance, rms", "percent"),
-        Column("worst", "worst", "percent"),
-        Column("worst_mode", "at mode", "count"),
-        hidden("told", "In words"),
-    ],
+    Column("discretisation", "Discretisation"),
+    Column("resolution", "Resolution", "count"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("modes", "Modes"),
+    Column("rms", "Distance, rms", "percent"),
+    Column("worst", "worst", "percent"),
+    Column("worst_mode", "at mode", "count"),
+    hidden("told", "In words"),
     keys="discretisation resolution",
 )
 def solid(evidence: Evidence) -> Iterator[Row]:
-    """How far the frequencies of the fine mesh are from the solid's."""
+    """Expected distance of the fine mesh's frequencies from those of the solid itself. Voxels are
+    compared with quadratic finite cells on the same lattice; the error of these follows from what
+    modes would lose if cells were larger. Positive: too high."""
     settings, distance = evidence.settings, evidence.distance
     row = {
         "discretisation": settings["discretisation"],
@@ -67,25 +61,22 @@ def solid(evidence: Evidence) -> Iterator[Row]:
 
 
 @table(
-    """Natural frequencies [Hz] by mode number, and their relative errors against the ground
-    truth. Eigenvalues err about twice as much; the file holds those of all modes.""",
-    lambda evidence: [
-        Column("mode", "Mode", "count"),
-        Column("truth", "Ground truth", "hertz"),
-        *(
-            column
-            for variant in evidence.compared
-            for column in (
-                Column(f"{variant}", f"{VARIANTS[variant].label}", "hertz"),
-                Column(f"{variant}_frequency", "error", "percent"),
-                hidden(f"{variant}_eigenvalue", "of the eigenvalue", "percent"),
-            )
-        ),
-    ],
+    Column("mode", "Mode", "count"),
+    Column("truth", "Ground truth", "hertz"),
+    lambda evidence: (
+        column
+        for variant in evidence.compared
+        for column in (
+            Column(f"{variant}", f"{VARIANTS[variant].label}", "hertz"),
+            Column(f"{variant}_frequency", "error", "percent"),
+            hidden(f"{variant}_eigenvalue", "of the eigenvalue", "percent"),
+        )
+    ),
     keys="mode",
 )
 def errors(evidence: Evidence) -> Iterator[Row]:
-    """Eigenvalue and frequency errors of every elastic mode."""
+    """Natural frequencies [Hz] by mode number, and their relative errors against the ground truth.
+    Eigenvalues err about twice as much; the file holds those of all modes."""
     spectra = evidence.shown
     truth = spectra[TRUTH]
     for index in range(RIGID_MODES, min(len(part.eigenvalues) for part in spectra.values())):
@@ -100,21 +91,18 @@ def errors(evidence: Evidence) -> Iterator[Row]:
 
 
 @table(
-    """Mass-weighted angles between the ground truth's modes and each method's. Modes whose
-    eigenvalues lie within 0.1 % of each other are a cluster and compared as one space. 90°
-    means that a mode has changed places with another one.""",
-    [
-        Column("method", "Method"),
-        Column("clusters", "Clusters compared", "count"),
-        Column("several", "of several modes", "count"),
-        Column("median", "Median angle", "angle"),
-        Column("largest", "Largest angle", "angle"),
-        Column("modes", "in modes"),
-        Column("likeness", "Likeness of mode 7", "fraction"),
-    ],
+    Column("method", "Method"),
+    Column("clusters", "Clusters compared", "count"),
+    Column("several", "of several modes", "count"),
+    Column("median", "Median angle", "angle"),
+    Column("largest", "Largest angle", "angle"),
+    Column("modes", "in modes"),
+    Column("likeness", "Likeness of mode 7", "fraction"),
 )
 def shapes(evidence: Evidence) -> Iterator[Row]:
-    """How far the spaces of modes are turned against the truth's."""
+    """Mass-weighted angles between the ground truth's modes and each method's. Modes whose
+    eigenvalues lie within 0.1 % of each other are a cluster and compared as one space. 90° means
+    that a mode has changed places with another one."""
     first_mode = evidence.read_json(f"figures/{evidence.model}-mode.json")
     for variant in evidence.compared:
         clusters = evidence.compared[variant]["clusters"]
@@ -136,28 +124,24 @@ def shapes(evidence: Evidence) -> Iterator[Row]:
 
 
 @table(
-    """Found anew from each modes file alone: K and M are assembled from the mesh and the moduli
-    in the file by other code than the solver's own. Counted: eigenvalues below a value in a gap
-    near the end, by the inertia of K − μM; found: those that the file holds. 2-norm residuals
-    are |Kx − λMx| / (λ|Mx|), energy residuals √(rᵀ(K + sM)⁻¹r / λ); the criteria judge the
-    latter.""",
-    [
-        Column("method", "Method"),
-        Column("unknowns", "Unknowns", "count"),
-        Column("modes", "Modes", "count"),
-        Column("residual_median", "2-norm residual, median", "small"),
-        Column("residual_max", "largest", "small"),
-        Column("energy_max", "Energy residual, largest", "small"),
-        Column("orthogonality", "|XᵀMX − I|", "small"),
-        Column("rigid_modes", "Rigid modes", "count"),
-        Column("expected", "Found", "count"),
-        Column("counted", "Counted", "count"),
-        hidden("counted_below", "below", "small", "rad^2/s^2"),
-        hidden("mass", "Mass", "small", "kg"),
-    ],
+    Column("method", "Method"),
+    Column("unknowns", "Unknowns", "count"),
+    Column("modes", "Modes", "count"),
+    Column("residual_median", "2-norm residual, median", "small"),
+    Column("residual_max", "largest", "small"),
+    Column("energy_max", "Energy residual, largest", "small"),
+    Column("orthogonality", "|XᵀMX − I|", "small"),
+    Column("rigid_modes", "Rigid modes", "count"),
+    Column("expected", "Found", "count"),
+    Column("counted", "Counted", "count"),
+    hidden("counted_below", "below", "small", "rad^2/s^2"),
+    hidden("mass", "Mass", "small", "kg"),
 )
 def audits(evidence: Evidence) -> list[Row]:
-    """What each modes file proves, found anew from the file alone."""
+    """Found anew from each modes file alone: K and M are assembled from the mesh and the moduli in
+    the file by other code than the solver's own. Counted: eigenvalues below a value in a gap near
+    the end, by the inertia of K − μM; found: those that the file holds. 2-norm residuals are |Kx −
+    λMx| / (λ|Mx|), energy residuals √(rᵀ(K + sM)⁻¹r / λ); the criteria judge the latter."""
     spectra = evidence.audit["spectra"]
     return [
         {
@@ -170,19 +154,16 @@ def audits(evidence: Evidence) -> list[Row]:
 
 
 @table(
-    """Motion and sound after a strike. Difference of motion: relative 2-norm of the difference
-    to the ground truth over the time shown. Difference of sound: rms difference of the
-    spectrograms where either is within 60 dB of the loudest.""",
-    [
-        Column("method", "Method"),
-        Column("audible", "Modes heard", "count"),
-        Column("peak", "Largest displacement [m]", "small", "m"),
-        Column("difference", "Difference of motion", "percent"),
-        Column("distance_decibels", "of sound [dB]", "small", "dB"),
-    ],
+    Column("method", "Method"),
+    Column("audible", "Modes heard", "count"),
+    Column("peak", "Largest displacement [m]", "small", "m"),
+    Column("difference", "Difference of motion", "percent"),
+    Column("distance_decibels", "of sound [dB]", "small", "dB"),
 )
 def responses(evidence: Evidence) -> Iterator[Row]:
-    """How far motion and sound after a strike are from the truth's."""
+    """Motion and sound after a strike. Difference of motion: relative 2-norm of the difference to
+    the ground truth over the time shown. Difference of sound: rms difference of the spectrograms
+    where either is within 60 dB of the loudest."""
     for variant in evidence.shown:
         response = evidence.response.responses[variant]
         row = {
