@@ -15,7 +15,6 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from string import Formatter
@@ -69,6 +68,15 @@ class Column:
 def hidden(key: str, label: str, kind: str = "text", unit: str = "", source: str = "") -> Column:
     """A column for programs alone."""
     return Column(key, label, kind, unit, shown=False, source=source)
+
+
+SOLID = (hidden("model", "Model"), Column("title", "Solid"))
+"""Columns that name the solid of a row, see `solid`."""
+
+
+def solid(results: Any, name: str) -> Row:
+    """Values of the columns `SOLID`, from results that have `titles`."""
+    return {"model": name, "title": results.titles[name]}
 
 
 def spread(
@@ -186,18 +194,19 @@ class Tabulation:
 
     name: str
     rows: Callable[[Any], Iterable[Row]]
-    caption: Callable[[Any], str]
+    fields: Mapping[str, Any]
     columns: Sequence[Columns]
     keys: str = ""
     conditions: Callable[[Any], Conditions | None] | None = None
 
     def __call__(self, results: Any) -> Table:
         """Make the table, its name behind the `prefix` of the results if they have one."""
+        caption = _Caption().format(self.rows.__doc__ or "", results, **self.fields)
         given = [part(results) if callable(part) else part for part in self.columns]
         columns = [c for part in given for c in ([part] if isinstance(part, Column) else part)]
         return Table(
             f"{getattr(results, 'prefix', '')}{self.name}",
-            re.sub(r"\s*\n\s*", " ", self.caption(results)).strip(),
+            re.sub(r"\s*\n\s*", " ", caption).strip(),
             columns,
             [_picked(row, columns) for row in self.rows(results)],
             self.keys.split(),
@@ -210,13 +219,13 @@ def table(
     keys: str = "",
     conditions: Callable[[Any], Conditions | None] | None = None,
     name: str = "",
-    caption: Callable[[Any], str] | None = None,
+    **fields: Any,
 ) -> Callable[[Callable[[Any], Iterable[Row]]], Tabulation]:
     """Make a table of a function that yields its rows from results.
 
     Rows hold values by key or source; a column without its value is empty. The docstring of the
-    function is the caption: what the table shows, over which modes, against which base. Fields in
-    its braces are attributes of the results, shown as of the kind that their format names.
+    function is the caption: what the table shows, over which modes, against which base. In its
+    braces are attributes of the results, shown as of the kind that their format names.
 
     Parameters
     ----------
@@ -226,23 +235,23 @@ def table(
         Says how the results were measured.
     name
         Of the table, that of the function if empty.
-    caption
-        Makes the caption of the results where a docstring cannot say it.
+    fields
+        What else the caption holds in braces: values, or functions of the results.
     """
 
     def of_rows(rows: Callable[[Any], Iterable[Row]]) -> Tabulation:
         own = name or rows.__name__.replace("_", "-")
-        text = caption or partial(_Caption().format, rows.__doc__ or "")
-        return Tabulation(own, rows, text, columns, keys, conditions)
+        return Tabulation(own, rows, fields, columns, keys, conditions)
 
     return of_rows
 
 
 class _Caption(Formatter):
-    """Fields are attributes of the results, and formats are kinds."""
+    """Fields are those given, or attributes of the results; formats are kinds."""
 
     def get_value(self, key: int | str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
-        return getattr(args[0], str(key))
+        field = kwargs[str(key)] if key in kwargs else getattr(args[0], str(key))
+        return field(args[0]) if key in kwargs and callable(field) else field
 
     def format_field(self, value: Any, format_spec: str) -> str:
         return show(value, format_spec) if format_spec in KINDS else format(value, format_spec)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from studies.base.table import Column, Row, hidden, table
-from studies.campaign.results import ENDS, PASSED, Campaign, end_of, nearest, share_of
+from studies.base.table import SOLID, Column, Row, hidden, solid, table
+from studies.campaign.results import ENDS, Campaign, end_of, nearest, share_of
 from studies.campaign.results import FAILED as FAILED
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("material", "Material"),
     Column("seed", "Seed", "count"),
     Column("ranks", "Ranks", "count"),
@@ -32,13 +31,11 @@ def cells(study: Campaign) -> Iterator[Row]:
     for cell, result in study.found.items():
         end, worst = end_of(result), nearest(result)
         row: Row = {
-            "title": study.titles[cell.solid],
-            "model": cell.solid,
+            **solid(study, cell.solid),
             "material": cell.material,
             "seed": cell.seed,
             "ranks": cell.ranks,
             "end": end,
-            "end_mark": "met" if end == PASSED else "missed",
             "seconds": result["seconds"],
             "command": result["command"],
             "missed": sum(each["verdict"] == "missed" for each in result["criteria"]),
@@ -53,8 +50,7 @@ def cells(study: Campaign) -> Iterator[Row]:
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("cells", "Cells", "count"),
     Column("passed", "Passed", "count"),
     Column("missed", "Missed", "count"),
@@ -64,7 +60,7 @@ def cells(study: Campaign) -> Iterator[Row]:
 def solids(study: Campaign) -> Iterator[Row]:
     """Cells by how they ended. Wrong: a spectrum is not that of its matrices. Missed: a criterion
     that says something less."""
-    for solid in study.solids:
-        ends = [end_of(each) for cell, each in study.found.items() if cell.solid == solid]
-        row: Row = {"model": solid, "title": study.titles[solid], "cells": len(ends)}
-        yield row | {end.replace(" ", "_"): ends.count(end) for end in ENDS}
+    for name in study.solids:
+        ends = [end_of(each) for cell, each in study.found.items() if cell.solid == name]
+        counts = {end.replace(" ", "_"): ends.count(end) for end in ENDS}
+        yield {**solid(study, name), "cells": len(ends), **counts}

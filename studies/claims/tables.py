@@ -11,14 +11,11 @@ from jinja2 import Environment, StrictUndefined
 from carillon.files.yaml_input import read_own_yaml
 from studies.base.numbers import show
 from studies.base.table import Column, Row, hidden, table
-from studies.claims.findings import LESS, NOT, REPRODUCED
 from studies.claims.measures import MEASURES
 from studies.claims.results import FULL, MEASURED, SCENE_TABLE, Claims
 
 TEXTS: dict[str, dict[str, str]] = read_own_yaml(Path(__file__).with_name("claims.yaml"))
 NO_MESH = "mesh not at hand"
-MARKS = {REPRODUCED: "met", LESS: "met", NOT: "missed"}
-"""Marks of verdicts on the page."""
 COMMANDS = {
     f"{FULL}/": "snakemake figures",
     SCENE_TABLE: "snakemake scene_spectra",
@@ -55,7 +52,6 @@ def claims(results: Claims) -> Iterator[Row]:
             "claim": texts.from_string(written["claim"]).render(values),
             "measured": found.text,
             "verdict": found.verdict,
-            "verdict_mark": MARKS.get(found.verdict, ""),
             "why": written["why"],
             "files": ", ".join(found.files),
         }

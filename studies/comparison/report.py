@@ -171,24 +171,18 @@ def records(cells: pd.DataFrame) -> list[Row]:
     return rows
 
 
-EVERY_NUMBER = table(
-    "Every number of both folders.",
-    [Column(name, name) for name in RAW],
-    keys="table row column",
-    name=NAME,
-)(records)
+EVERY_NUMBER = table(*(Column(name, name) for name in RAW), keys="table row column", name=NAME)(
+    records
+)
 LISTED = table(
-    "",
-    [
-        hidden("table", "Table"),
-        Column("row", "Row"),
-        Column("label", "Quantity"),
-        Column("verdict", "Verdict"),
-        hidden("verdict_mark", "Its mark", source="mark"),
-        Column("before", "Baseline", source="before_shown"),
-        Column("now", "This run", source="now_shown"),
-        Column("ratio", "Ratio", "times"),
-    ],
+    hidden("table", "Table"),
+    Column("row", "Row"),
+    Column("label", "Quantity"),
+    Column("verdict", "Verdict"),
+    hidden("verdict_mark", "Its mark", source="mark"),
+    Column("before", "Baseline", source="before_shown"),
+    Column("now", "This run", source="now_shown"),
+    Column("ratio", "Ratio", "times"),
     keys="table row column",
 )(records)
 

@@ -95,8 +95,8 @@ def variants_figure(study: ForestsStudy) -> Figure:
 
 def sizes_figure(study: ForestsStudy) -> Figure:
     """Time of a block over the size of forests."""
-    sizes = study.result("benchmark")["sizes"]
-    ours = study.result("benchmark")["megabytes"]
+    sizes = study.benchmark["sizes"]
+    ours = study.benchmark["megabytes"]
     figure, axes = plt.subplots(figsize=(7.6, 3.4))
     for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
         values = [size[key]["median"] for size in sizes]

@@ -25,6 +25,11 @@ class ForestsStudy(Results):
         """Output of `forests table`."""
         return self.read_json("blocks.json")
 
+    @cached_property
+    def benchmark(self) -> dict[str, Any]:
+        """Times of the forests, from `forests benchmark`."""
+        return self.result("benchmark")
+
     def result(self, name: str) -> Any:
         """Numbers of a measurement."""
         return self.read_json(f"{name}.json")["result"]

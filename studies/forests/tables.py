@@ -7,7 +7,7 @@ from typing import Any
 
 from studies.base.conditions import IN_COLUMNS, ONE_COLD_RUN, Repeats, measured
 from studies.base.numbers import show
-from studies.base.table import Column, Row, hidden, spread, table
+from studies.base.table import Column, Row, each, hidden, spread, table
 from studies.forests.results import ForestsStudy
 from workflow.report.blocks_tables import MEASURE, MEASURED, kind_of, on_blocks
 from workflow.report.blocks_tables import blocks as blocks
@@ -21,13 +21,10 @@ MICRO, NANO, MEGA = 1e-6, 1e-9, 1e6
     Column("quantity", "Quantity"),
     Column("value", "Value"),
     hidden("value_kind", "Its kind"),
-    caption=lambda study: (
-        f"""The forests studied ({study.model["path"]}): objective {study.model["objective"]},
-        Poisson’s ratio {study.model["poisson"]:g}. Held-out blocks were not used in training."""
-    ),
 )
 def model(study: ForestsStudy) -> Iterator[Row]:
-    """Size and held-out scores of the forests studied."""
+    """The forests studied ({model[path]}): objective {model[objective]}, Poisson’s ratio
+    {model[poisson]:g}. Held-out blocks were not used in training."""
     return scores_rows(study.model)
 
 
@@ -48,33 +45,28 @@ def model(study: ForestsStudy) -> Iterator[Row]:
     Column("training_seconds", "Made in", "seconds"),
     keys="blocks method",
     conditions=MEASURED,
-    caption=lambda results: (
-        f"""Every coarsening on {on_blocks(results)[0]["blocks"]:,} random blocks of each kind,
-        on one core; costs are medians. Errors: {MEASURE} Corner: forces on the corners only.
-        Databases beyond the range that they were made for take their stiffest material."""
-    ),
+    measure=MEASURE,
 )
 def every_block(results: Any) -> Iterator[Row]:
-    """All that `forests table` found, row by row."""
+    """Every coarsening on {on_blocks[result][0][blocks]:count} random blocks of each kind, on one
+    core; costs are medians. Errors: {measure} Corner: forces on the corners only. Databases beyond
+    the range that they were made for take their stiffest material."""
     for row in on_blocks(results):
         scale = show(row["scaled_by"], "count")
         scaled = "" if row["scaled_by"] == 1.0 else f" (others times {scale})"
         yield {**row, "blocks": kind_of(row) + scaled}
 
 
-def distributions(study: ForestsStudy, part: str) -> list[str]:
-    """Names for people of the distributions that trainings are scored on."""
-    return [name.replace("..", "…") for name in study.result(part)[0]["scores"]]
-
-
-def _scores(study: ForestsStudy, part: str) -> Iterator[Column]:
+def _scores(study: ForestsStudy, part: str) -> list[Column]:
     """Columns of the scores of trainings, by distribution."""
-    for number, name in enumerate(distributions(study, part)):
-        key = f"scores{number}"
-        yield Column(f"{key}_rms_log_solid", f"{name}: rms of log E, solid", "fraction")
-        yield Column(f"{key}_rms_log_partly_void", "rms of log E, partly void", "fraction")
-        yield Column(f"{key}_median_error", "median error of E", "percent")
-        yield Column(f"{key}_r2_log", "R² of log E", "score")
+    names = study.result(part)[0]["scores"]
+    return each(
+        {f"scores{number}": name.replace("..", "…") for number, name in enumerate(names)},
+        Column("{name}_rms_log_solid", "{label}: rms of log E, solid", "fraction"),
+        Column("{name}_rms_log_partly_void", "rms of log E, partly void", "fraction"),
+        Column("{name}_median_error", "median error of E", "percent"),
+        Column("{name}_r2_log", "R² of log E", "score"),
+    )
 
 
 def _trainings(study: ForestsStudy, part: str) -> Iterator[Row]:
@@ -127,8 +119,7 @@ def curve(study: ForestsStudy) -> Iterator[Row]:
 
 def runs(study: ForestsStudy) -> int:
     """Runs of which every time is the median."""
-    timing: Row = next(iter(study.result("benchmark")["evaluation"].values()))
-    return int(timing["runs"])
+    return int(next(iter(study.benchmark["evaluation"].values()))["runs"])
 
 
 def _repeats(study: ForestsStudy) -> Repeats:
@@ -141,26 +132,20 @@ def _seconds(key: str, timing: Row) -> Row:
     return {f"{key}{end}": MICRO * timing[name] for end, name in ends.items()}
 
 
-def _cost_caption(study: ForestsStudy) -> str:
-    benchmark = study.result("benchmark")
-    rival = show(benchmark["rival"]["ratio"], "times")
-    caches = ", ".join(f"{name} {size}" for name, size in benchmark["caches"].items())
-    return f"""Wall time of a block by the forests studied, {benchmark["blocks"]:,} random blocks at
-    once, {runs(study)} warm runs; loading the forests takes
-    {show(benchmark["load_ms"] / 1e3, "seconds")}. On the trees of the last two rows scikit-learn
-    takes {rival} the time of coarsen, both on one core. {benchmark["processor"]}, caches
-    {caches}."""
-
-
 @table(
     Column("evaluation", "Evaluation"),
     spread("seconds", "Median", "seconds"),
     conditions=_measured("benchmark", _repeats, threads="as the row says"),
-    caption=_cost_caption,
+    runs=runs,
+    loading=lambda study: study.benchmark["load_ms"] / 1e3,
+    caches=lambda study: ", ".join(f"{k} {size}" for k, size in study.benchmark["caches"].items()),
 )
 def cost(study: ForestsStudy) -> Iterator[Row]:
-    """Time of a block by each evaluation, and by scikit-learn's."""
-    benchmark = study.result("benchmark")
+    """Wall time of a block by the forests studied, {benchmark[blocks]:count} random blocks at once,
+    {runs} warm runs; loading the forests takes {loading:seconds}. On the trees of the last two rows
+    scikit-learn takes {benchmark[rival][ratio]:times} the time of coarsen, both on one core.
+    {benchmark[processor]}, caches {caches}."""
+    benchmark = study.benchmark
     rival = benchmark["rival"]
     theirs = (
         f"scikit-learn’s predict, features given: 2×{rival['trees']} trees of its own, "
@@ -185,7 +170,7 @@ def cost(study: ForestsStudy) -> Iterator[Row]:
 def sizes(study: ForestsStudy) -> Iterator[Row]:
     """Wall time of a block on one core by forests of complete trees, for random blocks and for
     those of a mesh, whose neighbours are alike; a walk is that of one origin down one tree."""
-    for size in study.result("benchmark")["sizes"]:
+    for size in study.benchmark["sizes"]:
         row = {"bytes": MEGA * size["megabytes"], "trees": size["trees"], "depth": size["depth"]}
         for kind in ("random", "coherent"):
             row |= _seconds(kind, size[kind]) | {f"{kind}_walk": NANO * size[f"{kind}_walk_ns"]}

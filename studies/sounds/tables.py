@@ -14,7 +14,6 @@ from sound.design.objective import fall
 from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
 from studies.base.conditions import ONE_COLD_RUN, measured
-from studies.base.numbers import show
 from studies.base.table import Column, Row, hidden, table
 from studies.sounds import spectral_distance
 from studies.sounds.results import SoundResults
@@ -106,14 +105,11 @@ def frequencies(results: SoundResults) -> Iterator[Row]:
     Column("truth", "Fine model [Hz]", "hertz"),
     Column("error", "Coarse from fine", "percent"),
     Column("bark", "Fine from target [bark]", "fraction", "bark"),
-    caption=lambda results: (
-        f"""The same material on all {f"{results.truth.mesh.n_cells:,}"} voxels, solved by
-        SLEPc: what the coarse model of {f"{results.design.model.mesh.n_cells:,}"} cells, on
-        which the material was sought, errs by, and how far the fine model is from the targets."""
-    ),
 )
 def truth(results: SoundResults) -> Iterator[Row]:
-    """What the fine model with the same material sounds at."""
+    """The same material on all {truth.mesh.n_cells:count} voxels, solved by SLEPc: what the coarse
+    model of {design.model.mesh.n_cells:count} cells, on which the material was sought, errs by, and
+    how far the fine model is from the targets."""
     targets, design = results.design.targets.frequencies, results.design
     hertz = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
     return _by_mode(
@@ -164,16 +160,14 @@ def nearness(results: SoundResults) -> Iterator[Row]:
     Column("fine", "After, fine model [dB]", "fraction", "dB"),
     Column("wanted", "Modes designed [dB]", "fraction", "dB"),
     Column("modes", "All modes of the clip [dB]", "fraction", "dB"),
-    caption=lambda results: (
-        f"""How far modes alone sound from the clip, from where its modes ring freely on: rms
-        difference of the levels in third-octave bands from 100 Hz to 16 kHz, in windows of 23
-        ms, down to {show(abs(spectral_distance.FLOOR_DECIBELS), "count")} dB below the loudest.
-        Modes designed are those of the clip that were asked for, as a perfect material sounds;
-        all modes of the clip are what the extraction knows of it; silence is at the floor."""
-    ),
+    floor=abs(spectral_distance.FLOOR_DECIBELS),
 )
 def distances(results: SoundResults) -> Iterator[Row]:
-    """How far modes alone sound from the clip, at every struck point."""
+    """How far modes alone sound from the clip, from where its modes ring freely on: rms difference
+    of the levels in third-octave bands from 100 Hz to 16 kHz, in windows of 23 ms, down to
+    {floor:count} dB below the loudest. Modes designed are those of the clip that were asked for, as
+    a perfect material sounds; all modes of the clip are what the extraction knows of it; silence is
+    at the floor."""
     for name in results.design.targets.names:
         _, rate = results.sound("fine", name)
         target = results.target(name, rate)

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from studies.base.conditions import IN_COLUMNS, Repeats, measured
-from studies.base.table import Column, Row, hidden, table
+from studies.base.table import Column, Row, each, hidden, table
 
 LOWER_BOUND = "least of any element"
 ERRORS = {
@@ -63,23 +63,14 @@ def method_of(row: Row) -> str:
     return name.removesuffix(f" {low:g}..{high:g} GPa")
 
 
-def _errors(number: int, kind: str) -> tuple[Column, ...]:
-    """Columns of the errors on a kind of blocks."""
-    key = f"kind{number}"
-    return (
-        Column(f"{key}_nodal", f"{kind}: nodal", "fraction"),
-        hidden(f"{key}_nodal_median", f"{kind}: nodal, median", "fraction"),
-        Column(f"{key}_inertial", "inertia", "fraction"),
-        hidden(f"{key}_inertial_median", f"{kind}: inertia, median", "fraction"),
-    )
-
-
 @table(
     Column("method", "Coarsening"),
-    lambda results: (
-        column
-        for each in enumerate(kinds_of(compared(on_blocks(results))))
-        for column in _errors(*each)
+    lambda results: each(
+        {f"kind{n}": kind for n, kind in enumerate(kinds_of(compared(on_blocks(results))))},
+        Column("{name}_nodal", "{label}: nodal", "fraction"),
+        hidden("{name}_nodal_median", "{label}: nodal, median", "fraction"),
+        Column("{name}_inertial", "inertia", "fraction"),
+        hidden("{name}_inertial_median", "{label}: inertia, median", "fraction"),
     ),
     Column("seconds_per_block", "Cost per block", "seconds"),
     Column("seconds_per_block_min", "min", "seconds"),
@@ -87,19 +78,14 @@ def _errors(number: int, kind: str) -> tuple[Column, ...]:
     Column("storage_bytes", "Storage", "bytes"),
     Column("training_seconds", "Made in", "seconds"),
     conditions=MEASURED,
-    caption=lambda results: (
-        f"""Relative squared displacement error on {on_blocks(results)[0]["blocks"]:,} random
-        blocks of each kind, mean over the blocks: {MEASURE} Medians are in the CSV file. A
-        database is made for each kind, its storage and time are those of one; cost on one core,
-        median."""
-    ),
+    measure=MEASURE,
 )
 def blocks(results: Any) -> Iterator[Row]:
-    """One row a coarsening, two columns a kind of blocks.
-
-    Kinds that only scale others are left out, as their errors are the same, and so are methods
-    beyond the range that they were made for.
-    """
+    """Relative squared displacement error on {on_blocks[result][0][blocks]:count} random blocks of
+    each kind, mean over the blocks: {measure} Medians are in the CSV file. A database is made for
+    each kind, its storage and time are those of one; cost on one core, median."""
+    # Kinds that only scale others are left out, as their errors are the same, and so are methods
+    # beyond the range that they were made for.
     used = compared(on_blocks(results))
     keys = {kind: f"kind{number}" for number, kind in enumerate(kinds_of(used))}
     frame = pd.DataFrame(used)

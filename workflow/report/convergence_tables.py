@@ -8,7 +8,7 @@ from typing import Any
 from solver.hcms.condense import DEFAULT_INTERFACE
 from studies.base.conditions import NOT_TIMED, measured
 from studies.base.numbers import show
-from studies.base.table import Column, Row, Table, hidden, table
+from studies.base.table import SOLID, Column, Row, Table, solid, table
 
 PAPER, OURS = "relaxation", "krylov"
 ACCELERATIONS = {PAPER: "over-relaxed, as in the paper", OURS: "Krylov-accelerated"}
@@ -37,8 +37,7 @@ MEASURED = measured(
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("modes", "Modes", "count"),
     Column("start", "Start"),
     Column("acceleration", "Corrections"),
@@ -56,8 +55,7 @@ def convergence(results: Any) -> Iterator[Row]:
         for curve in history["histories"]:
             for step, errors in enumerate(curve["eigenvalue_error"]):
                 yield {
-                    "model": model,
-                    "title": results.titles[model],
+                    **solid(results, model),
                     "modes": history["modes"],
                     "start": start_label(curve["start"]),
                     "acceleration": ACCELERATIONS[curve["acceleration"]],

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver.files.modes_file import FINE_TAKEN
 from studies.base.numbers import show
-from studies.base.table import Column, Row, Table, hidden, table
+from studies.base.table import SOLID, Column, Row, Table, hidden, solid, table
 from workflow.report.methods_tables import MEASURED as MEASURED
 
 NEEDED = ("slepc", "ddfem_rough", "ddfem_ec", "ddfem_ec_warm")
@@ -19,26 +19,25 @@ QUANTITIES = ("cold", "warm", "cold_same", "warm_same", "fine", "error")
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     hidden("resolution", "Voxels along it", "count"),
     hidden("modes", "Modes", "count"),
-    Column("unknowns", "Unknowns", "count"),
-    Column("coarse_unknowns", "coarsened", "count"),
-    hidden("precompute", "Precomputation", "seconds"),
-    Column("slepc", "SLEPc, fine", "seconds"),
-    Column("slepc_coarse", "SLEPc, coarse", "seconds"),
-    Column("cold_seconds", "Cold", "seconds"),
-    Column("warm_seconds", "Warm", "seconds"),
+    Column("unknowns", "Unknowns", "count", source="dof_fine"),
+    Column("coarse_unknowns", "coarsened", "count", source="dof_coarse"),
+    hidden("precompute", "Precomputation", "seconds", source="seconds.precompute"),
+    Column("slepc", "SLEPc, fine", "seconds", source="seconds.slepc"),
+    Column("slepc_coarse", "SLEPc, coarse", "seconds", source="seconds.ddfem_rough"),
+    Column("cold_seconds", "Cold", "seconds", source="seconds.ddfem_ec"),
+    Column("warm_seconds", "Warm", "seconds", source="seconds.ddfem_ec_warm"),
     Column("cold", "Speed-up: cold, fine", "times"),
     Column("warm", "warm, fine", "times"),
     Column("cold_same", "cold, coarse", "times"),
     Column("warm_same", "warm, coarse", "times"),
-    Column("error", "Error, rms", "percent"),
+    Column("error", "Error, rms", "percent", source="frequency_error.ddfem.rms_7_60"),
     Column("worst", "worst", "percent"),
-    hidden("average_error", "if averaged", "percent"),
+    hidden("average_error", "if averaged", "percent", source="frequency_error.average.rms_7_60"),
     Column("solver_error", "Eigenvalue, worst", "percent"),
-    hidden("rival_error", "by SLEPc, coarse", "percent"),
+    hidden("rival_error", "by SLEPc, coarse", "percent", source="eigenvalue_error.ddfem_rough.max"),
     Column("fine", "fine mesh", "times"),
     hidden("fine_error", "Worst eigenvalue", "percent"),
     conditions=MEASURED,
@@ -55,29 +54,16 @@ def design(results: Any) -> Iterator[Row]:
         seconds = row["seconds"]
         if any(seconds.get(name) is None for name in NEEDED):
             continue
-        errors, tones = row["eigenvalue_error"], row["frequency_error"]["ddfem"]
-        fine = seconds.get("fastest")
+        errors, fine = row["eigenvalue_error"], seconds.get("fastest")
         yield {
-            "model": model,
-            "title": results.titles[model],
-            "resolution": row["resolution"],
-            "modes": row["modes"],
-            "unknowns": row["dof_fine"],
-            "coarse_unknowns": row["dof_coarse"],
-            "precompute": seconds["precompute"],
-            "slepc": seconds["slepc"],
-            "slepc_coarse": seconds["ddfem_rough"],
-            "cold_seconds": seconds["ddfem_ec"],
-            "warm_seconds": seconds["ddfem_ec_warm"],
+            **row,
+            **solid(results, model),
             "cold": seconds["slepc"] / seconds["ddfem_ec"],
             "warm": seconds["slepc"] / seconds["ddfem_ec_warm"],
             "cold_same": seconds["ddfem_rough"] / seconds["ddfem_ec"],
             "warm_same": seconds["ddfem_rough"] / seconds["ddfem_ec_warm"],
-            "error": tones["rms_7_60"],
-            "worst": abs(tones["worst_7_60"]),
-            "average_error": row["frequency_error"]["average"]["rms_7_60"],
+            "worst": abs(row["frequency_error"]["ddfem"]["worst_7_60"]),
             "solver_error": max(errors[name]["max"] for name in ("ddfem_ec", "ddfem_ec_warm")),
-            "rival_error": errors["ddfem_rough"]["max"],
             "fine": None if fine is None else seconds["slepc"] / fine,
             "fine_error": None if fine is None else errors["fastest"]["max"],
         }

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from studies.base.conditions import IN_COLUMNS, Repeats, measured
-from studies.base.table import MAX, MIN, Column, Row, hidden, spread, table
+from studies.base.table import MAX, MIN, SOLID, Column, Row, each, hidden, solid, spread, table
 
 METHODS = {
     "arpack": "ARPACK",
@@ -42,34 +42,10 @@ MEASURED = measured(
 )
 
 
-def timed(results: Any) -> list[str]:
-    """Methods that were timed on any solid."""
-    rows = results.methods.values()
-    return [name for name in METHODS if any(row["seconds"].get(name) for row in rows)]
-
-
-def caption(results: Any) -> str:
-    """What the table of methods shows, and how it was measured."""
-    rows = results.methods
-    return (
-        f"Median wall seconds of {_rounds(rows, ' rounds')} in which each method runs once, from "
-        "moduli to modes: coarsening, assembly and solution. Precomputation is what the meshes "
-        "need once for any material, fine and coarse. Checks of the results are not timed. DDFEM* "
-        "alone is coarsening and SLEPc on the coarse mesh, also to a residual of 10⁻². The warm "
-        "run follows moduli that differ by a smooth field of 5 %, from the modes of the unchanged "
-        "ones. EC goes on to an "
-        "eigenvalue error of 10⁻⁶, coarsened to 10⁻² but where 10⁻⁶ is said, from modes of HCMS "
-        "or, by block Lanczos, from random vectors; DDFEM* + EC takes the faster of these. "
-        "Errors are against SLEPc on the fine mesh: the largest of an eigenvalue, and the rms of "
-        "frequencies 7 to 60. SLEPc: "
-        + ("; ".join(f"{model} {_configuration(row)}" for model, row in rows.items()) or "none")
-        + "."
-        + "".join(
-            f" {model}, {METHODS[name]}: {reason}."
-            for model, row in rows.items()
-            for name, reason in row["failed"].items()
-        )
-    )
+def timed(results: Any) -> dict[str, str]:
+    """Methods that were timed on any solid, and their names for people."""
+    seconds = [row["seconds"] for row in results.methods.values()]
+    return {name: METHODS[name] for name in METHODS if any(each.get(name) for each in seconds)}
 
 
 def _rounds(rows: Mapping[str, Row], counted: str = "") -> str:
@@ -88,25 +64,24 @@ def _rounds(rows: Mapping[str, Row], counted: str = "") -> str:
     return f"{' or '.join(map(str, most))}{counted}{beside}"
 
 
-def _configuration(row: Row) -> str:
-    chosen = row["slepc_configuration"]
-    of = len(row["slepc_configurations_tried"])
-    tuned = f", the fastest of {of} tried" if of else ", its default"
-    return f"{chosen['package'].upper()}, {chosen['subspace']:g} Lanczos vectors a mode{tuned}"
+def _configurations(rows: Mapping[str, Row]) -> str:
+    texts = []
+    for model, row in rows.items():
+        chosen = row["slepc_configuration"]
+        of = len(row["slepc_configurations_tried"])
+        tuned = f", the fastest of {of} tried" if of else ", its default"
+        subspace = f"{chosen['subspace']:g} Lanczos vectors a mode"
+        texts.append(f"{model} {chosen['package'].upper()}, {subspace}{tuned}")
+    return "; ".join(texts) or "none"
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("modes", "Modes", "count"),
     Column("dof_fine", "Unknowns", "count"),
     Column("dof_coarse", "coarsened", "count"),
     Column("precompute", "Precomputation", "seconds"),
-    lambda results: (
-        column
-        for name in timed(results)
-        for column in (Column(f"{name}", f"{METHODS[name]}", "seconds"),)
-    ),
+    lambda results: each(timed(results), Column("{name}", "{label}", "seconds")),
     Column("hcms_error", "HCMS, worst eigenvalue", "percent", source="eigenvalue_error.hcms.max"),
     Column("hcms_ec_error", "HCMS + EC, worst", "percent", source="eigenvalue_error.hcms_ec.max"),
     Column(
@@ -116,32 +91,40 @@ def _configuration(row: Row) -> str:
         source="frequency_error.ddfem.rms_7_60",
     ),
     Column("average_error", "Average, 7–60", "percent", source="frequency_error.average.rms_7_60"),
-    lambda results: (
-        column
-        for name in timed(results)
-        for column in (
-            hidden(f"{name}_min", f"{METHODS[name]}, min", "seconds"),
-            hidden(f"{name}_max", f"{METHODS[name]}, max", "seconds"),
-        )
+    lambda results: each(
+        timed(results),
+        hidden("{name}_min", "{label}, min", "seconds"),
+        hidden("{name}_max", "{label}, max", "seconds"),
     ),
     conditions=MEASURED,
-    caption=lambda results: f"""{caption(results)}""",
+    rounds=lambda results: _rounds(results.methods, " rounds"),
+    slepc=lambda results: _configurations(results.methods),
+    failed=lambda results: "".join(
+        f" {model}, {METHODS[name]}: {reason}."
+        for model, row in results.methods.items()
+        for name, reason in row["failed"].items()
+    ),
 )
 def methods(results: Any) -> Iterator[Row]:
-    """Fig. 11: a row a solid, a column a method."""
+    """Median wall seconds of {rounds} in which each method runs once, from moduli to modes:
+    coarsening, assembly and solution. Precomputation is what the meshes need once for any material,
+    fine and coarse. Checks of the results are not timed. DDFEM* alone is coarsening and SLEPc on
+    the coarse mesh, also to a residual of 10⁻². The warm run follows moduli that differ by a smooth
+    field of 5 %, from the modes of the unchanged ones. EC goes on to an eigenvalue error of 10⁻⁶,
+    coarsened to 10⁻² but where 10⁻⁶ is said, from modes of HCMS or, by block Lanczos, from random
+    vectors; DDFEM* + EC takes the faster of these. Errors are against SLEPc on the fine mesh: the
+    largest of an eigenvalue, and the rms of frequencies 7 to 60. SLEPc: {slepc}.{failed}"""
     for model, row in results.methods.items():
         yield {
             **row,
             **row["seconds"],
             **{f"{name}_{end}": ends[end] for name, ends in row["spread"].items() for end in ends},
-            "model": model,
-            "title": results.titles[model],
+            **solid(results, model),
         }
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("method", "Method"),
     Column("runs", "Runs", "count"),
     spread("seconds", "Median", "seconds"),
@@ -157,8 +140,7 @@ def spreads(results: Any) -> Iterator[Row]:
     for model, row in results.methods.items():
         for name in (name for name in METHODS if name in row["spread"]):
             yield {
-                "model": model,
-                "title": results.titles[model],
+                **solid(results, model),
                 "method": METHODS[name],
                 "runs": row["runs"][name],
                 "seconds": row["seconds"][name],
@@ -168,8 +150,7 @@ def spreads(results: Any) -> Iterator[Row]:
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("method", "Method"),
     Column("base", "Base"),
     spread("ratio", "Speed-up", "times"),
@@ -193,7 +174,7 @@ def ratios(results: Any) -> Iterator[Row]:
                     for end, value in _ratio(row, method, base, row[part][method][base]).items()
                 }
                 names = {"method": METHODS[method], "base": METHODS[base]}
-                yield {"model": model, "title": results.titles[model], **names, **values}
+                yield {**solid(results, model), **names, **values}
 
 
 def _ratio(row: Row, method: str, base: str, ratio: float) -> dict[str, float]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from studies.base.conditions import Repeats, measured
-from studies.base.table import Column, Row, hidden, table
+from studies.base.table import SOLID, Column, Row, hidden, solid, table
 
 KINDS = ("strong", "weak")
 
@@ -24,8 +24,7 @@ MEASURED = measured(
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("kind", "Scaling"),
     Column("ranks", "Ranks", "count"),
     Column("n_dofs", "Unknowns", "count"),
@@ -39,24 +38,20 @@ MEASURED = measured(
     Column("peak_memory", "Peak memory of a rank", "bytes"),
     keys="model kind ranks",
     conditions=MEASURED,
-    caption=lambda results: (
-        f"""HCMS and error correction over MPI ranks of one core each, from moduli to modes: the
-        fastest run, and a model of operations, bytes and messages at rates fitted to the runs
-        that do not have more ranks than cores. Strong scaling keeps the solid, weak scaling the
-        unknowns of a rank. Model − measured is relative to the measured time.
-        {" ".join(fits(results))}"""
-    ),
+    fits=lambda results: " ".join(fits(results)),
 )
 def scaling(results: Any) -> Iterator[Row]:
-    """Wall time over ranks."""
+    """HCMS and error correction over MPI ranks of one core each, from moduli to modes: the fastest
+    run, and a model of operations, bytes and messages at rates fitted to the runs that do not have
+    more ranks than cores. Strong scaling keeps the solid, weak scaling the unknowns of a rank.
+    Model − measured is relative to the measured time. {fits}"""
     for model, kind, part in _parts(results):
         runs = {run["ranks"]: run for run in part["runs"]}
         modelled = {row["ranks"]: row for row in part["model"]["rows"]}
         for ranks in sorted({*runs, *modelled}):
             run = runs.get(ranks)
             yield {
-                "model": model,
-                "title": results.titles[model],
+                **solid(results, model),
                 "kind": kind,
                 **{key: (run or modelled[ranks])[key] for key in ("ranks", "n_dofs", "subdomains")},
                 **({} if run is None else run),

@@ -8,7 +8,7 @@ from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import FINE_TAKEN
 from solver.refinement.errors import FROM_SOLID as DISTANCE
 from studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
-from studies.base.table import Column, Row, hidden, table
+from studies.base.table import SOLID, Column, Row, each, hidden, solid, table
 from workflow.report.results import FAST, Run, precomputation_seconds, records, solve_seconds
 from workflow.variants import COARSENED as COARSENED
 from workflow.variants import FROM_SOLID, TRUTH, VARIANTS
@@ -22,16 +22,14 @@ def _identity(run: Run, model: str) -> Row:
     """Which solid a row is about, and how large it is."""
     spectra = run.spectra[model]
     return {
-        "model": model,
-        "title": run.titles[model],
+        **solid(run, model),
         "unknowns": spectra[TRUTH].mesh.n_dofs,
         **({"coarse_unknowns": spectra[FAST].mesh.n_dofs} if FAST in spectra else {}),
     }
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("unknowns", "Unknowns", "count"),
     Column("coarse_unknowns", "coarsened", "count"),
     Column("modes", "Modes", "count"),
@@ -75,13 +73,10 @@ def summary(run: Run) -> Iterator[Row]:
     Column("model", "Solid"),
     Column("mode", "Mode", "count"),
     Column("truth", "Ground truth", "hertz"),
-    (
-        column
-        for variant in SHOWN[1:]
-        for column in (
-            Column(f"{variant}", f"{VARIANTS[variant].label}", "hertz"),
-            Column(f"{variant}_error", "error", "percent"),
-        )
+    each(
+        {variant: VARIANTS[variant].label for variant in SHOWN[1:]},
+        Column("{name}", "{label}", "hertz"),
+        Column("{name}_error", "error", "percent"),
     ),
     keys="model mode",
     conditions=UNTIMED,
@@ -121,27 +116,18 @@ def errors(run: Run) -> Iterator[Row]:
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("unknowns", "Unknowns", "count"),
     Column("coarse_unknowns", "coarsened", "count"),
-    (
-        column
-        for variant, label in COARSENED.items()
-        for column in (
-            Column(
-                f"{variant}_rms",
-                f"{label}, rms",
-                "percent",
-                source=f"{variant}.frequency_rms_relative_error_7_60",
-            ),
-            Column(
-                f"{variant}_max",
-                "worst",
-                "percent",
-                source=f"{variant}.frequency_max_relative_error_7_60",
-            ),
-        )
+    each(
+        COARSENED,
+        Column(
+            "{name}_rms",
+            "{label}, rms",
+            "percent",
+            source="{name}.frequency_rms_relative_error_7_60",
+        ),
+        Column("{name}_max", "worst", "percent", source="{name}.frequency_max_relative_error_7_60"),
     ),
     conditions=UNTIMED,
 )
@@ -158,17 +144,12 @@ def coarsening(run: Run) -> Iterator[Row]:
 
 
 @table(
-    hidden("model", "Model"),
-    Column("title", "Solid"),
+    SOLID,
     Column("unknowns", "Unknowns", "count"),
     Column("coarse_unknowns", "coarsened", "count"),
     Column("precomputation", "Precomputation", "seconds"),
     Column("truth", "SLEPc (truth)", "seconds"),
-    (
-        column
-        for variant in TIMED[1:]
-        for column in (Column(f"{variant}", f"{VARIANTS[variant].label}", "seconds"),)
-    ),
+    [Column(name, VARIANTS[name].label, "seconds") for name in TIMED[1:]],
     Column("speed_up", "Speed-up over SLEPc", "times"),
     conditions=ONE_RUN,
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from carillon.fem.model import RIGID_MODES
-from studies.base.table import Column, Row, hidden, table
+from studies.base.table import Column, Row, each, hidden, table
 from workflow.validation.criteria import judge
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import Evidence
@@ -63,14 +63,11 @@ def solid(evidence: Evidence) -> Iterator[Row]:
 @table(
     Column("mode", "Mode", "count"),
     Column("truth", "Ground truth", "hertz"),
-    lambda evidence: (
-        column
-        for variant in evidence.compared
-        for column in (
-            Column(f"{variant}", f"{VARIANTS[variant].label}", "hertz"),
-            Column(f"{variant}_frequency", "error", "percent"),
-            hidden(f"{variant}_eigenvalue", "of the eigenvalue", "percent"),
-        )
+    lambda evidence: each(
+        {variant: VARIANTS[variant].label for variant in evidence.compared},
+        Column("{name}", "{label}", "hertz"),
+        Column("{name}_frequency", "error", "percent"),
+        hidden("{name}_eigenvalue", "of the eigenvalue", "percent"),
     ),
     keys="mode",
 )
