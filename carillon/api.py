@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from carillon.arrays import Array, Index
 from carillon.errors import UserError
 from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from sound.project.design import Design as FoundDesign
     from sound.rendering.heard_solid import HeardSolid
 
-Array = NDArray[np.float64]
 Young = float | str | Array | Callable[[Array], ArrayLike]
 
 DAMPING = (30.0, 1e-6)
@@ -86,7 +86,7 @@ class Mesh:
         return np.asarray(self.surface.vertices)
 
     @property
-    def faces(self) -> NDArray[np.int64]:
+    def faces(self) -> Index:
         """Vertices (f, 3) of the triangles."""
         return np.asarray(self.surface.faces)
 

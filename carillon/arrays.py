@@ -1,9 +1,16 @@
-"""Types of arrays in annotations."""
+"""Types of arrays and surfaces in annotations, and arrays that nobody changes."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any, TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh as Surface  # Its import takes long; many commands need no surface.
+else:
+    Surface = Any
 
 Array = NDArray[np.float64]
 """Array of numbers in double precision."""
@@ -11,3 +18,15 @@ Complex = NDArray[np.complex128]
 """Array of complex numbers in double precision."""
 Integers = NDArray[np.integer]
 """Array of whole numbers of any length."""
+Index = NDArray[np.int64]
+"""Array of numbers of other things."""
+Flags = NDArray[np.bool_]
+"""Array of truth values."""
+
+Table = TypeVar("Table", bound=NDArray[Any])
+
+
+def frozen(table: Table) -> Table:
+    """The same array, which cannot be written to any more."""
+    table.setflags(write=False)
+    return table

@@ -10,10 +10,7 @@ from typing import Any
 def exports(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
     """The function `__getattr__` of a package.
 
-    Parameters
-    ----------
-    modules
-        The module that has it, by the name that is exported; relative to the package.
+    `modules`: the module that has it, by the name that is exported; relative to the package.
 
     Examples
     --------

@@ -33,10 +33,7 @@ POISSON = (-1.0, 0.5)
 def require_constants(poisson: float, density: float) -> None:
     """Check Poisson's ratio and the mass density [kg/m^3] of a solid.
 
-    Raises
-    ------
-    UserError
-        If one is out of range.
+    Raises UserError if one is out of range.
     """
     if not POISSON[0] < poisson < POISSON[1]:
         raise UserError(f"Poisson's ratio {poisson:g} is outside (-1, 0.5)")

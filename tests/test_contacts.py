@@ -10,10 +10,8 @@ from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import voxelize
-from carillon.fem.geometry.builtin import BUILTINS, builtin_surface
+from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS, builtin_surface
 from carillon.fem.geometry.contacts import one_body
-from carillon.fem.geometry.thin import THIN
-from carillon.fem.geometry.trials import TRIALS
 from tests.mesh_files import block, concatenated, inside_out, soup
 
 CUBE = block((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))

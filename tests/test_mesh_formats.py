@@ -10,8 +10,8 @@ import trimesh
 
 from carillon.errors import UserError
 from carillon.fem.geometry import load_surface, voxelize
-from carillon.fem.geometry.obj import plain_obj
 from carillon.fem.geometry.orientation import turned_alike
+from carillon.fem.geometry.plain_files import plain_obj
 from solver.analysis.problem import ProblemOptions, build_problem
 from tests.mesh_files import DTYPES, Gltf, block, concatenated
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from carillon.fem.moduli_file import read_moduli
+from carillon.fem.moduli import read_moduli
 
 COUNT = 6
 YOUNG = np.linspace(1e8, 1e10, COUNT)

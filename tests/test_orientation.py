@@ -9,10 +9,8 @@ import trimesh
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import load_surface, voxelize
-from carillon.fem.geometry.builtin import BUILTINS, builtin_surface
+from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS, builtin_surface
 from carillon.fem.geometry.orientation import turned_alike
-from carillon.fem.geometry.thin import THIN
-from carillon.fem.geometry.trials import TRIALS
 from tests.mesh_files import (
     block,
     both_ways,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import load_surface
-from carillon.fem.moduli_file import read_moduli
+from carillon.fem.moduli import read_moduli
 from dataset_gen.generate import generate_file
 from dataset_gen.journal import journal_of
 from dataset_gen.settings import ShardOptions, settings_of

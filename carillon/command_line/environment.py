@@ -16,10 +16,7 @@ from carillon.records import provenance
 def describe() -> dict[str, Any]:
     """Versions, MPI, PETSc and SLEPc with their solvers, BLAS and cores of this environment.
 
-    Raises
-    ------
-    UserError
-        If PETSc, SLEPc or MPI cannot be imported.
+    Raises UserError if PETSc, SLEPc or MPI cannot be imported.
     """
     try:
         from mpi4py import MPI

@@ -70,6 +70,8 @@ def draw(
 ) -> Poly3DCollection:
     """Draw the surface of a mesh, deformed if asked for, lit from the upper left.
 
+    Raises ValueError if an array's shape or `up` does not fit.
+
     Parameters
     ----------
     ax
@@ -99,11 +101,6 @@ def draw(
     -------
     Poly3DCollection
         The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
-
-    Raises
-    ------
-    ValueError
-        If an array's shape or `up` does not fit.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, cg
 
+from carillon.arrays import Array
 from carillon.errors import LocalConvergenceError
-
-Array = NDArray[np.float64]
 
 DAMPING = 0.7
 """Damping factor of a Jacobi step; it reduces most what differs from vertex to vertex."""
@@ -130,13 +129,14 @@ class ShiftedInverse:
     def solve(self, rhs: Array) -> Array:
         """Solution (m,) for a right-hand side.
 
-        Raises
-        ------
-        LocalConvergenceError
-            If `MOST_ITERATIONS` do not reach the tolerance.
+        Raises LocalConvergenceError if `MOST_ITERATIONS` do not reach the tolerance.
         """
         matrix = self._matrix
-        cycle = LinearOperator(matrix.shape, matvec=self._preconditioned, dtype=float)
+
+        def cycled(rhs: Array) -> Array:
+            return self._cycle(rhs.astype(CYCLE), 0).astype(float)
+
+        cycle = LinearOperator(matrix.shape, matvec=cycled, dtype=float)
         solution, missed = cg(
             matrix, rhs, rtol=self._tolerance, atol=0.0, maxiter=MOST_ITERATIONS, M=cycle
         )
@@ -146,9 +146,6 @@ class ShiftedInverse:
                 f"{MOST_ITERATIONS} iterations"
             )
         return np.asarray(solution)
-
-    def _preconditioned(self, rhs: Array) -> Array:
-        return self._cycle(rhs.astype(CYCLE), 0).astype(float)
 
     def _cycle(self, rhs: NDArray[np.float32], number: int) -> NDArray[np.float32]:
         if number == len(self._sums):

@@ -11,12 +11,11 @@ from functools import cache
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index, frozen
 from carillon.fem.element import (
     CORNERS,
     DEFAULT_POISSON,
-    Array,
     nodal_mass,
     shape_functions,
     uniform_stiffness,
@@ -28,21 +27,19 @@ COARSE_EDGE = 2.0
 ALL_FILLED = 0b11111111
 """Void pattern without void cells; bit j of a pattern is set where cell j is filled."""
 
-NODES: NDArray[np.int64] = np.array(
-    [[x, y, z] for z in range(3) for y in range(3) for x in range(3)]
-)
+NODES: Index = np.array([[x, y, z] for z in range(3) for y in range(3) for x in range(3)])
 """(27, 3) lattice positions of the block's nodes."""
 
-CELL_NODES: NDArray[np.int64] = np.array(
+CELL_NODES: Index = np.array(
     [[(o + c) @ (1, 3, 9) for c in CORNERS] for o in CORNERS], dtype=np.int64
 )
 """(8, 8) nodes of each fine cell."""
 
-CORNER_NODES: NDArray[np.int64] = np.array([2 * c @ (1, 3, 9) for c in CORNERS], dtype=np.int64)
+CORNER_NODES: Index = np.array([2 * c @ (1, 3, 9) for c in CORNERS], dtype=np.int64)
 """(8,) block nodes that are the coarse element's corners."""
 
 
-def degrees_of_freedom(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def degrees_of_freedom(nodes: Index) -> Index:
     """Degrees of freedom 3n, 3n+1, 3n+2 of nodes (..., n), in order; shape (..., 3 n)."""
     dofs = 3 * nodes[..., None] + np.arange(3)
     return dofs.reshape(*nodes.shape[:-1], -1)
@@ -51,17 +48,13 @@ def degrees_of_freedom(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
 @cache
 def nodal_prolongation() -> Array:
     """Trilinear interpolation (27, 8) from the coarse corners to the block's nodes."""
-    matrix = shape_functions(NODES / COARSE_EDGE)
-    matrix.setflags(write=False)
-    return matrix
+    return frozen(shape_functions(NODES / COARSE_EDGE))
 
 
 @cache
 def prolongation() -> Array:
     """P (81, 24): `nodal_prolongation` for each displacement component."""
-    matrix = np.kron(nodal_prolongation(), np.eye(3))
-    matrix.setflags(write=False)
-    return matrix
+    return frozen(np.kron(nodal_prolongation(), np.eye(3)))
 
 
 @cache
@@ -71,8 +64,7 @@ def cell_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     for cell, nodes in enumerate(CELL_NODES):
         dofs = degrees_of_freedom(nodes)
         matrices[cell][np.ix_(dofs, dofs)] = uniform_stiffness(poisson)
-    matrices.setflags(write=False)
-    return matrices
+    return frozen(matrices)
 
 
 @cache
@@ -81,17 +73,15 @@ def cell_mass() -> Array:
     matrices = np.zeros((8, 27, 27))
     for cell, nodes in enumerate(CELL_NODES):
         matrices[cell][np.ix_(nodes, nodes)] = nodal_mass()
-    matrices.setflags(write=False)
-    return matrices
+    return frozen(matrices)
 
 
 @cache
 def coarse_cell_mass() -> Array:
     """Share (8, 8, 8) of each fine cell in the coarse nodal mass: P^T M_j P for unit density."""
     interpolation = nodal_prolongation()
-    matrices = np.einsum("na,jnm,mb->jab", interpolation, cell_mass(), interpolation, optimize=True)
-    matrices.setflags(write=False)
-    return matrices
+    operands = interpolation, cell_mass(), interpolation
+    return frozen(np.einsum("na,jnm,mb->jab", *operands, optimize=True))
 
 
 def galerkin_moduli(young: Array) -> Array:
@@ -112,12 +102,12 @@ def galerkin_moduli(young: Array) -> Array:
     return np.asarray((young[:, :, None] * weights).sum(axis=1))
 
 
-def active_nodes(filled: NDArray[np.bool_]) -> NDArray[np.int64]:
+def active_nodes(filled: Flags) -> Index:
     """Sorted nodes of the block that touch a filled cell; `filled` is (8,)."""
     return np.unique(CELL_NODES[filled])
 
 
-def void_patterns(young: Array) -> NDArray[np.int64]:
+def void_patterns(young: Array) -> Index:
     """Void patterns (n,) of blocks (n, 8), or that of one block (8,): bit j if cell j is filled.
 
     Examples
@@ -129,25 +119,20 @@ def void_patterns(young: Array) -> NDArray[np.int64]:
 
 
 @cache
-def symmetries() -> NDArray[np.int64]:
+def symmetries() -> Index:
     """The cube's 48 symmetries as permutations (48, 8): row g sends cell j to [g, j]."""
-    images = []
-    for axes in permutations(range(3)):
-        for flips in product((0, 1), repeat=3):
-            moved = CORNERS[:, list(axes)] ^ np.array(flips)
-            images.append(moved @ (1, 2, 4))
-    table = np.array(images, dtype=np.int64)
-    table.setflags(write=False)
-    return table
+    images = [
+        (CORNERS[:, list(axes)] ^ np.array(flips)) @ (1, 2, 4)
+        for axes, flips in product(permutations(range(3)), product((0, 1), repeat=3))
+    ]
+    return frozen(np.array(images, dtype=np.int64))
 
 
 @cache
-def pattern_images() -> NDArray[np.int64]:
+def pattern_images() -> Index:
     """Images (256, 48) of every void pattern under the cube's symmetries."""
     filled = np.arange(256)[:, None] >> np.arange(8) & 1
-    images = filled @ (1 << symmetries()).T
-    images.setflags(write=False)
-    return images
+    return frozen(filled @ (1 << symmetries()).T)
 
 
 def least_patterns() -> list[int]:

@@ -9,11 +9,10 @@ from __future__ import annotations
 from functools import cache, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array, Index, frozen
 
-CORNERS: NDArray[np.int64] = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])
+CORNERS: Index = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])
 """(8, 3) offsets of the corners, in bit order."""
 
 DEFAULT_POISSON = 0.25
@@ -28,19 +27,21 @@ GAUSS_POINTS: Array = 0.5 + (CORNERS - 0.5) / np.sqrt(3.0)
 
 def shape_functions(points: Array) -> Array:
     """Trilinear shape functions at `points` (p, 3) of the unit cube; shape (p, 8)."""
-    factors = np.where(CORNERS[None] == 1, points[:, None], 1.0 - points[:, None])
-    return np.asarray(factors.prod(axis=2))
+    return np.asarray(_factors(points).prod(axis=2))
 
 
 def shape_gradients(points: Array) -> Array:
     """Gradients of the shape functions on the unit cube; shape (p, 8, 3)."""
-    factors = np.where(CORNERS[None] == 1, points[:, None], 1.0 - points[:, None])
-    signs = 2.0 * CORNERS - 1.0
+    factors, signs = _factors(points), 2.0 * CORNERS - 1.0
     gradients = np.empty((len(points), 8, 3))
     for axis in range(3):
         others = [a for a in range(3) if a != axis]
         gradients[:, :, axis] = signs[:, axis] * factors[:, :, others].prod(axis=2)
     return gradients
+
+
+def _factors(points: Array) -> Array:
+    return np.where(CORNERS[None] == 1, points[:, None], 1.0 - points[:, None])
 
 
 def elasticity_matrix(poisson: float = DEFAULT_POISSON) -> Array:
@@ -85,17 +86,13 @@ def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     strain = strain_displacement(shape_gradients(GAUSS_POINTS))
     elasticity = elasticity_matrix(poisson)
     matrices = np.einsum("qia,ij,qjb->qab", strain, elasticity, strain, optimize=True) / 8.0
-    matrices = 0.5 * (matrices + matrices.transpose(0, 2, 1))
-    matrices.setflags(write=False)
-    return matrices
+    return frozen(0.5 * (matrices + matrices.transpose(0, 2, 1)))
 
 
 @lru_cache(KEPT)
 def uniform_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     """Stiffness (24, 24) of the element with uniform unit modulus and unit edge."""
-    matrix = quadrature_stiffness(poisson).sum(axis=0)
-    matrix.setflags(write=False)
-    return matrix
+    return frozen(quadrature_stiffness(poisson).sum(axis=0))
 
 
 @cache
@@ -113,19 +110,13 @@ def nodal_mass(lumped: bool = False) -> Array:
     """
     line = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
     matrix = np.kron(np.kron(line, line), line)
-    if lumped:
-        matrix = np.diag(matrix.sum(axis=1))
-    matrix.setflags(write=False)
-    return matrix
+    return frozen(np.diag(matrix.sum(axis=1)) if lumped else matrix)
 
 
 def rigid_motions(nodes: Array, centre: Array | None = None) -> Array:
     """Three translations, three rotations about `centre`, or the centroid of `nodes` (n, 3).
 
-    Returns
-    -------
-    (3 n, 6)
-        Displacements of the nodes.
+    Displacements of the nodes, (3 n, 6).
     """
     centred = nodes - (nodes.mean(axis=0) if centre is None else centre)
     motions = np.zeros((len(nodes), 3, 6))

@@ -9,12 +9,12 @@ from typing import Any, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import ALL_FILLED, coarse_cell_mass
 from carillon.fem.element import CORNERS, quadrature_stiffness
 from carillon.fem.geometry.hanging import WHOLE, node_places, node_weights
 
-Array = NDArray[np.float64]
-Chosen = NDArray[np.integer] | NDArray[np.bool_] | slice
+Chosen = NDArray[np.integer] | Flags | slice
 
 
 class Elements(ABC):
@@ -36,7 +36,7 @@ class Elements(ABC):
 
     @property
     @abstractmethod
-    def node_places(self) -> NDArray[np.int64]:
+    def node_places(self) -> Index:
         """Places (c, k, 3) of the nodes about a point of each element, in edges."""
 
     @property
@@ -46,7 +46,7 @@ class Elements(ABC):
 
     @property
     @abstractmethod
-    def collinear(self) -> NDArray[np.bool_] | None:
+    def collinear(self) -> Flags | None:
         """Which elements (c,) may have three nodes on a line; None if none has."""
 
     @property
@@ -84,18 +84,12 @@ class Elements(ABC):
 
 @dataclass(frozen=True)
 class HexElements(Elements):
-    """Cubic elements with material, wherever their nodes may be.
+    """Cubic elements with material, wherever their nodes may be; see `ElasticModel`.
 
     Attributes
     ----------
-    young : (c, 8)
-        See `ElasticModel` [Pa].
-    fill : (c,)
-        See `ElasticModel`.
     edge
         Edge of an element [m], of the smaller ones in a mixed mesh.
-    poisson, density, lumped, lumped_share
-        See `ElasticModel`.
     kinds : (c,) int32
         Of the elements of a mixed mesh, see `carillon.fem.geometry.hanging`; else None.
     """
@@ -110,39 +104,32 @@ class HexElements(Elements):
     kinds: NDArray[np.int32] | None = None
 
     def of(self, *arrays: NDArray[Any]) -> Self:
-        """Other elements of the same solid; with kinds if these have kinds."""
         young, fill, *kinds = arrays
         return replace(self, young=young, fill=fill, kinds=kinds[0] if kinds else None)
 
     def arrays(self) -> list[NDArray[Any]]:
-        """What differs from element to element: the arguments of `of`."""
         kinds = [] if self.kinds is None else [self.kinds]
         return [self.young, self.fill, *kinds]
 
     @property
     def steps(self) -> int:
-        """Edges along the largest element."""
         return 1 if self.kinds is None else 2
 
     @property
-    def node_places(self) -> NDArray[np.int64]:
-        """Places (c, 8, 3) of the nodes about a point of each element, in edges."""
+    def node_places(self) -> Index:
         if self.kinds is None:
             return np.broadcast_to(CORNERS, (len(self), 8, 3))
         return node_places()[self.kinds]
 
     @property
-    def collinear(self) -> NDArray[np.bool_] | None:
-        """Those (c,) of a mixed mesh with hanging corners; else None."""
+    def collinear(self) -> Flags | None:
         return None if self.kinds is None else (self.kinds != WHOLE) & (self.kinds % 256 != 0)
 
     @property
     def sort_key(self) -> NDArray[np.uint8]:
-        """The octants that they hold."""
         return self.fill
 
     def stiffness(self, chosen: Chosen = slice(None)) -> Array:
-        """Element stiffness matrices (c, 24, 24) [N/m] of the chosen elements."""
         kernels = quadrature_stiffness(self.poisson).reshape(8, 576)
         stiffness = (self.edge * (self.young[chosen] @ kernels)).reshape(-1, 24, 24)
         if self.kinds is None:
@@ -181,7 +168,7 @@ class HexElements(Elements):
         return np.asarray(mass + share[:, None, None] * (lumped - mass))
 
 
-def _at_hanging_corners(kinds: NDArray[np.int32]) -> tuple[NDArray[np.int64], Array]:
+def _at_hanging_corners(kinds: NDArray[np.int32]) -> tuple[Index, Array]:
     """Elements (h,) with hanging corners, and the weights (h, 8, 8) of their nodes there."""
     hangs = np.flatnonzero((kinds != WHOLE) & (kinds % 256 != 0))
     return hangs, node_weights()[kinds[hangs]]

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from carillon.arrays import Array
 from carillon.fem.aggregation import COARSEST, Level, ShiftedInverse, levels_of
 from carillon.fem.geometry.faces import face_neighbours
 from carillon.processes.threads import blas_threads
@@ -21,7 +21,6 @@ from carillon.processes.threads import blas_threads
 if TYPE_CHECKING:
     from carillon.fem.geometry import HexMesh
 
-Array = NDArray[np.float64]
 
 FEW_CELLS = 12_000
 """Cells up to which the Laplacian is factorised; the factors of more fill up."""

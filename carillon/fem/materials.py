@@ -6,16 +6,15 @@ import os
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
-from carillon.fem.moduli_file import read_moduli
+from carillon.fem.moduli import read_moduli
 from carillon.files.paths import require_file
 
 if TYPE_CHECKING:  # Geometry needs trimesh, whose import takes long; names of materials do without.
     from carillon.fem.geometry import HexMesh
 
-Array = NDArray[np.float64]
 
 UNIFORM_YOUNG = 1.0e9
 """Modulus [Pa] of the uniform material and the geometric mean of the smooth one."""
@@ -32,23 +31,6 @@ NOISE_YOUNG = (1.0e7, 1.0e10)
 NAMES = ("uniform", "smooth", "two-region", "random", "noise")
 
 
-def uniform(mesh: HexMesh) -> Array:
-    """1 GPa everywhere."""
-    return np.full(mesh.n_cells, UNIFORM_YOUNG)
-
-
-def two_region(mesh: HexMesh) -> Array:
-    """A half of 10 GPa and one of 0.1 GPa, cut at the median across the longest extent."""
-    axis = int(np.argmax(np.ptp(mesh.grid, axis=0)))
-    position = mesh.grid[:, axis]
-    return np.where(position < np.median(position), *TWO_REGION_YOUNG)
-
-
-def smooth(mesh: HexMesh, seed: int = 0) -> Array:
-    """0.1 to 10 GPa: a smooth random field as log10 of the modulus."""
-    return UNIFORM_YOUNG * 10.0 ** (SMOOTH_DECADES * smooth_field(mesh, seed))
-
-
 def smooth_field(mesh: HexMesh, seed: int = 0) -> Array:
     """Values (m,) within -1 and 1: a random sum of the lowest Laplacian eigenvectors."""
     from carillon.fem.laplacian import laplacian_modes  # Its import takes long.
@@ -62,24 +44,11 @@ def smooth_field(mesh: HexMesh, seed: int = 0) -> Array:
     return np.asarray(field / peak if peak > 0.0 else field)
 
 
-def random(mesh: HexMesh, seed: int = 0) -> Array:
-    """Independent in every cell, log-uniform over 0.01 to 10 GPa."""
-    low, high = RANDOM_DECADES
-    return 1e9 * 10.0 ** np.random.default_rng(seed).uniform(low, high, mesh.n_cells)
-
-
-def noise(mesh: HexMesh, seed: int = 0) -> Array:
-    """Independent in every cell, uniform over 0.01 to 10 GPa: seldom soft."""
-    return np.random.default_rng(seed).uniform(*NOISE_YOUNG, mesh.n_cells)
-
-
 def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") -> Array:
     """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file with one value per cell.
 
-    Raises
-    ------
-    UserError
-        If there is no such file, or for what `carillon.fem.moduli_file.read_moduli` refuses.
+    Raises UserError if there is no such file, or for what `carillon.fem.moduli.read_moduli`
+    refuses.
 
     Examples
     --------
@@ -88,22 +57,21 @@ def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") 
     >>> young_modulus("two-region", mesh).tolist()
     [10000000000.0, 100000000.0]
     """
+    count, draw = mesh.n_cells, np.random.default_rng(seed).uniform
     match name:
         case "uniform":
-            return uniform(mesh)
+            return np.full(count, UNIFORM_YOUNG)
         case "smooth":
-            return smooth(mesh, seed)
+            return UNIFORM_YOUNG * 10.0 ** (SMOOTH_DECADES * smooth_field(mesh, seed))
         case "two-region":
-            return two_region(mesh)
+            position = mesh.grid[:, np.argmax(np.ptp(mesh.grid, axis=0))]
+            return np.where(position < np.median(position), *TWO_REGION_YOUNG)
         case "random":
-            return random(mesh, seed)
+            return 1e9 * 10.0 ** draw(*RANDOM_DECADES, count)
         case "noise":
-            return noise(mesh, seed)
-        case _:
-            if not os.path.exists(name):
-                raise UserError(
-                    f"material {name!r} is neither a file nor one of the names {', '.join(NAMES)}"
-                )
-            return read_moduli(
-                require_file(name, "a material, a file of moduli"), mesh.n_cells, label
-            )
+            return draw(*NOISE_YOUNG, count)
+    if not os.path.exists(name):
+        raise UserError(
+            f"material {name!r} is neither a file nor one of the names {', '.join(NAMES)}"
+        )
+    return read_moduli(require_file(name, "a material, a file of moduli"), count, label)

@@ -9,14 +9,13 @@ from typing import Any, Self, TypedDict, Unpack, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags
 from carillon.fem.block import ALL_FILLED
 from carillon.fem.element import DEFAULT_POISSON, shape_functions
 from carillon.fem.elements import Chosen, Elements, HexElements
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.moduli import at_points, require_moduli
-
-Array = NDArray[np.float64]
 
 RIGID_MODES = 6
 """Motions without strain of a connected free body."""
@@ -65,7 +64,7 @@ class Solid(ABC):
 
     @property
     @abstractmethod
-    def filled(self) -> NDArray[np.bool_]:
+    def filled(self) -> Flags:
         """Which octants (c, 8) of the elements hold material."""
 
     @abstractmethod
@@ -76,10 +75,7 @@ class Solid(ABC):
     def element_moduli(self, young: Array) -> Array:
         """Moduli (c, p) [Pa] at the elements' points from those that a user gives.
 
-        Raises
-        ------
-        UserError
-            For what `carillon.fem.moduli.require_moduli` refuses.
+        Raises UserError for what `carillon.fem.moduli.require_moduli` refuses.
         """
 
     @abstractmethod
@@ -140,7 +136,6 @@ class ElasticModel(Solid):
 
     @property
     def elements(self) -> HexElements:
-        """The elements of all cells."""
         return HexElements(
             self.young,
             self.fill,
@@ -154,17 +149,14 @@ class ElasticModel(Solid):
 
     @property
     def connectivity(self) -> NDArray[np.int32]:
-        """Nodes (m, 8) of each cell."""
         return np.asarray(self.mesh.cells)
 
     @property
     def hexmesh(self) -> HexMesh:
-        """The mesh itself."""
         return self.mesh
 
     @property
-    def filled(self) -> NDArray[np.bool_]:
-        """See `Solid.filled`."""
+    def filled(self) -> Flags:
         return np.unpackbits(self.fill[:, None], axis=1, bitorder="little").astype(bool)
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
@@ -175,16 +167,13 @@ class ElasticModel(Solid):
         return np.einsum("pk,pkj->pj", weights, node_weights()[self.mesh.kinds[elements]])
 
     def element_moduli(self, young: Array) -> Array:
-        """Moduli (m, 8) [Pa] at the quadrature points, from (m,) or (m, 8); see `Solid`."""
         return at_points(require_moduli(young, self.mesh.n_cells))
 
     def with_young(self, young: Array) -> Self:
-        """The same solid with other moduli, (m,) or (m, 8) [Pa]; see `Solid`."""
         return replace(self, young=self.element_moduli(young))
 
     @property
     def mass(self) -> float:
-        """Mass of the solid [kg]."""
         octants = np.unpackbits(self.fill[:, None], axis=1).sum(axis=1, dtype=int)
         if self.mesh.span is not None:
             octants = octants * self.mesh.span.astype(int) ** 3
@@ -202,10 +191,7 @@ class Constants(TypedDict, total=False):
 def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:
     """Solid of a fine mesh with moduli `young`, (m,) or (m, 8) [Pa].
 
-    Raises
-    ------
-    UserError
-        For what `carillon.fem.moduli.require_moduli` refuses.
+    Raises UserError for what `carillon.fem.moduli.require_moduli` refuses.
 
     Examples
     --------

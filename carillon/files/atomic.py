@@ -100,11 +100,7 @@ def remove_leftovers(folder: int, name: str) -> None:
     """Remove temporary files of `name` that nobody holds a lock on.
 
     Regular files alone are opened: links, pipes and devices of such names are somebody else's.
-
-    Parameters
-    ----------
-    folder
-        Descriptor of the folder that they are in.
+    `folder`: descriptor of the folder that they are in.
     """
     start, end = temporary_name(name)
     for other in os.listdir(folder):

@@ -67,10 +67,7 @@ def require_whole(file: h5py.File) -> None:
 def _entries(root: h5py.Group) -> Iterator[tuple[h5py.Group, str, Any]]:
     """Each group and dataset once, with the group that it is in and its name there.
 
-    Raises
-    ------
-    UserError
-        If there are too many, they are too deep, or one has two names.
+    Raises UserError if there are too many, they are too deep, or one has two names.
     """
     yield root, "/", root
     seen = {h5o.get_info(root.id).addr}

@@ -25,10 +25,7 @@ def find(
 ) -> h5py.Dataset:
     """The dataset `name`, which is there and has this shape and kind of numbers.
 
-    Parameters
-    ----------
-    shape
-        None stands for any length.
+    `shape`: None stands for any length.
 
     Raises
     ------
@@ -52,10 +49,7 @@ def read(
 ) -> NDArray[Any]:
     """All of the dataset that `find` finds; real numbers must be finite.
 
-    Raises
-    ------
-    UserError
-        If it is not there, of another shape or kind, or holds what is no number.
+    Raises UserError if it is not there, of another shape or kind, or holds what is no number.
     """
     return finite(group, name, find(group, name, shape, kind)[()])
 
@@ -63,10 +57,7 @@ def read(
 def finite(group: h5py.Group, name: str, values: NDArray[Any]) -> NDArray[Any]:
     """The values of the dataset `name`, or a part of them, if all are finite.
 
-    Raises
-    ------
-    UserError
-        If not.
+    Raises UserError if not.
     """
     if not np.isfinite(values).all():
         count = int(np.count_nonzero(~np.isfinite(values)))
@@ -77,10 +68,7 @@ def finite(group: h5py.Group, name: str, values: NDArray[Any]) -> NDArray[Any]:
 def number(group: h5py.Group, name: str, low: float = -np.inf, high: float = np.inf) -> float:
     """The attribute `name`, a finite number in `low`..`high`.
 
-    Raises
-    ------
-    UserError
-        If it is not there or anything else.
+    Raises UserError if it is not there or anything else.
     """
     try:
         value = float(group.attrs[name])

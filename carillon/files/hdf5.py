@@ -126,10 +126,7 @@ def _seal_of(stream: io.BufferedRandom | io.BufferedReader) -> bytes:
 def _is_sealed(path: Path) -> bool:
     """Whether the file begins with a seal; it is read once in a process, unless it changes.
 
-    Raises
-    ------
-    UserError
-        If the seal is broken.
+    Raises UserError if the seal is broken.
     """
     status = path.stat()
     return _is_version_sealed(path, status.st_ino, status.st_size, status.st_mtime_ns)
@@ -156,14 +153,10 @@ def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
 def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> Iterator[h5py.File]:
     """Open the HDF5 file `path` for reading and check that it is what it should be.
 
-    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one.  What goes
-    wrong within the body is taken for a fault of the file: do nothing but reading in there.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another kind, or of another schema version, or its
-        content cannot be read as the body tries to.
+    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one. What goes
+    wrong within the body is taken for a fault of the file: do nothing but reading in there. Raises
+    UserError if the file is missing, damaged, of another kind, or of another schema version, or its
+    content cannot be read as the body tries to.
     """
     path = require_file(path, f"a Carillon {kind} file (HDF5)")
     try:
@@ -197,15 +190,7 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
 def kind_of(path: str | Path, what: str) -> tuple[str, int]:
     """Kind and schema version that a file claims; no kind if it is no file of this project.
 
-    Parameters
-    ----------
-    what
-        What it should be, for messages.
-
-    Raises
-    ------
-    UserError
-        If there is no such file.
+    `what`: what it should be, for messages. Raises UserError if there is no such file.
     """
     require_file(path, what)
     try:
@@ -218,10 +203,7 @@ def kind_of(path: str | Path, what: str) -> tuple[str, int]:
 def _claimed(file: h5py.File, name: str, otherwise: Any = None) -> Any:
     """An attribute of a file, if it is a single value: a list may be of any length.
 
-    Raises
-    ------
-    KeyError
-        If there is none, and nothing to take otherwise.
+    Raises KeyError if there is none, and nothing to take otherwise.
     """
     if name in file.attrs and file.attrs.get_id(name).shape == ():
         return file.attrs[name]

@@ -22,19 +22,15 @@ _MISSING = 0
 class HeldFolder:
     """A folder by its descriptor, so that nobody puts another one in its place.
 
-    Names are those of things directly in it.  Links in it are never followed: a file that is one is
-    neither read nor replaced.  What is replaced is another file of that name, never written to in
-    place, so that a second name of the old one (a hard link) keeps its content.
+    Names are those of things directly in it. Links in it are never followed: a file that is one is
+    neither read nor replaced. What is replaced is another file of that name, never written to in
+    place, so that a second name of the old one (a hard link) keeps its content. Raises OSError if
+    there is no such folder, or it cannot be opened.
 
     Parameters
     ----------
     path
         Of the folder, for messages too; it may be a link or lead through links.
-
-    Raises
-    ------
-    OSError
-        If there is no such folder, or it cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,12 +44,8 @@ class HeldFolder:
     def child(self, name: str) -> HeldFolder:
         """The folder `name` in this one, made if there is none.
 
-        Raises
-        ------
-        UserError
-            If something else has that name, a link above all.
-        OSError
-            If it can be neither made nor opened.
+        Raises UserError if something else has that name, a link above all, and OSError if it can be
+        neither made nor opened.
         """
         with suppress(FileExistsError):
             os.mkdir(_plain(name), dir_fd=self._folder)
@@ -83,10 +75,7 @@ class HeldFolder:
     def require_replaceable(self, name: str) -> None:
         """Check that a file of this name may be written: there is none, or a regular one.
 
-        Raises
-        ------
-        UserError
-            If a link, folder, pipe, device or socket has the name.
+        Raises UserError if a link, folder, pipe, device or socket has the name.
         """
         mode = self._mode(name)
         if mode != _MISSING and not stat.S_ISREG(mode):
@@ -99,10 +88,7 @@ class HeldFolder:
     def reading(self, name: str) -> Iterator[IO[bytes]]:
         """Open a regular file for reading.
 
-        Raises
-        ------
-        UserError
-            If it is missing, something else, or cannot be read.
+        Raises UserError if it is missing, something else, or cannot be read.
         """
         self._require_file(name)
         flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
@@ -115,15 +101,7 @@ class HeldFolder:
     def read(self, name: str, most: int) -> bytes:
         """Content of a file.
 
-        Parameters
-        ----------
-        most
-            Bytes that it may have.
-
-        Raises
-        ------
-        UserError
-            As `reading` does, or if it is longer.
+        `most`: bytes that it may have. Raises UserError as `reading` does, or if it is longer.
         """
         with self.reading(name) as stream:
             content = stream.read(most + 1)
@@ -135,13 +113,9 @@ class HeldFolder:
     def writing(self, name: str) -> Iterator[IO[bytes]]:
         """Write a file: under another name first, flushed to disk, then renamed.
 
-        When the body raises, the temporary file is removed and what was there stays.
-
-        Raises
-        ------
-        UserError
-            If the name is none for a file, something else than a regular file has it, or the file
-            cannot be written.
+        When the body raises, the temporary file is removed and what was there stays. Raises
+        UserError if the name is none for a file, something else than a regular file has it, or the
+        file cannot be written.
         """
         require_plain(self.path / _plain(name))
         self.require_replaceable(name)
@@ -175,10 +149,7 @@ class HeldFolder:
     def passing(self, start: str) -> Iterator[Path]:
         """A new folder in this one, with a name that begins with `start`; gone at the end.
 
-        Raises
-        ------
-        OSError
-            If it cannot be made.
+        Raises OSError if it cannot be made.
         """
         name = f"{start}{secrets.token_hex(8)}"
         os.mkdir(_plain(name), 0o700, dir_fd=self._folder)
@@ -225,10 +196,7 @@ class HeldFolder:
 def _plain(name: str) -> str:
     """A name that leads nowhere else.
 
-    Raises
-    ------
-    UserError
-        If it does.
+    Raises UserError if it does.
     """
     if not name or name in (".", "..") or "/" in name or "\0" in name:
         raise UserError(f"{name!r}: is no name of a file, expected one without slashes")

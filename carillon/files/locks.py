@@ -23,13 +23,9 @@ _NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.EINVAL)
 def locked(path: str | Path) -> Iterator[None]:
     """Hold the result `path` for this process alone, while it works out what to write there.
 
-    For results that a later run goes on from.  The lock is a file beside `path`, removed at the
-    end; what a killed process has left is taken over by the next one.
-
-    Raises
-    ------
-    UserError
-        If another process holds it, or it cannot be made.
+    For results that a later run goes on from. The lock is a file beside `path`, removed at the end;
+    what a killed process has left is taken over by the next one. Raises UserError if another
+    process holds it, or it cannot be made.
     """
     path = require_writable(path)
     name = Path(f"{path.parent}/.{path.name}.lock")

@@ -50,15 +50,7 @@ def cause(error: OSError) -> str:
 def require_file(path: str | Path, what: str) -> Path:
     """Check that there is a regular file to read, not a folder, device or pipe, which may not end.
 
-    Parameters
-    ----------
-    what
-        What it should be, for messages: "a mesh".
-
-    Raises
-    ------
-    UserError
-        If there is none.
+    `what`: what it should be, for messages: "a mesh". Raises UserError if there is none.
     """
     path = Path(path)
     try:
@@ -80,18 +72,10 @@ def require_writable(path: str | Path, inputs: Iterable[str | Path] = ()) -> Pat
 
     What is there already may only be a regular file, which will be replaced, or a symbolic link to
     one: then the link stays and the file that it names is replaced, or made if it is missing.
-
-    Parameters
-    ----------
-    inputs
-        Files that are read for the result, which must not replace them; what is no file among them
-        does not matter.
-
-    Raises
-    ------
-    UserError
-        If the name is no name for a file or that of an input, the folder is missing or not
-        writable, or something else than a regular file is there: a folder, device, pipe or socket.
+    `inputs`: files that are read for the result, which must not replace them; what is no file among
+    them does not matter. Raises UserError if the name is no name for a file or that of an input,
+    the folder is missing or not writable, or something else than a regular file is there: a folder,
+    device, pipe or socket.
     """
     if str(path).endswith(os.sep):
         raise UserError(f"{path}: names a folder, expected the name of a file to write")
@@ -119,10 +103,8 @@ def require_writable(path: str | Path, inputs: Iterable[str | Path] = ()) -> Pat
 def require_plain(path: Path) -> None:
     """Check that a name is one that terminals, file systems and formats of text can hold.
 
-    Raises
-    ------
-    UserError
-        If it has line breaks, control characters, bytes that are no text, or is too long.
+    Raises UserError if it has line breaks, control characters, bytes that are no text, or is too
+    long.
     """
     text = str(path)
     if any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in text):
@@ -140,12 +122,8 @@ def require_plain(path: Path) -> None:
 def target_of(path: Path) -> Path:
     """The file that writing to `path` makes or replaces, symbolic links followed.
 
-    Raises
-    ------
-    UserError
-        If something else than a regular file is there.
-    OSError
-        If that cannot be found out.
+    Raises UserError if something else than a regular file is there, and OSError if that cannot be
+    found out.
     """
     try:
         mode = path.stat().st_mode

@@ -73,18 +73,15 @@ def read_yaml(path: str | Path, what: str) -> dict[str, Any]:
 def read_marked(path: str | Path, what: str) -> tuple[dict[str, Any], yaml.Node]:
     """The keys and values of a YAML file, and its nodes, of which `line_of` tells lines.
 
+    Raises UserError if the file is missing, no file, too large, no YAML, nested too deeply, holds
+    references or a key twice, or no keys and values.
+
     Parameters
     ----------
     path
         Of the file.
     what
         What the file should be, for messages: "a project".
-
-    Raises
-    ------
-    UserError
-        If the file is missing, no file, too large, no YAML, nested too deeply, holds references or
-        a key twice, or no keys and values.
     """
     path = Path(path)
     try:
@@ -145,10 +142,7 @@ def read_own_yaml(path: Path) -> Any:
 def parse_yaml(text: str) -> Any:
     """What a text in YAML says.
 
-    Raises
-    ------
-    UserError
-        If it is no YAML, nested too deeply, or holds references or a key twice.
+    Raises UserError if it is no YAML, nested too deeply, or holds references or a key twice.
 
     Examples
     --------

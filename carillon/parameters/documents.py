@@ -24,6 +24,9 @@ _EXACT = 2.0**53
 def read_parameters(path: str | Path, model: type[T], what: str) -> T:
     """Read a YAML file.
 
+    Raises UserError if the file cannot be read (see `carillon.files.yaml_input.read_marked`), or
+    with the line and one sentence about the first thing that is wrong with it.
+
     Parameters
     ----------
     path
@@ -32,12 +35,6 @@ def read_parameters(path: str | Path, model: type[T], what: str) -> T:
         Dataclass of parameters that it describes.
     what
         What the file should be, for messages: "a project".
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read (see `carillon.files.yaml_input.read_marked`), or with the line
-        and one sentence about the first thing that is wrong with it.
     """
     document, node = read_marked(path, what)
     try:
@@ -52,12 +49,7 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
     """Parameters from plain keys and values, as YAML and JSON have them.
 
     Nothing is converted but numbers such as 30.0, which are whole ones, and whole ones where others
-    are expected.
-
-    Raises
-    ------
-    ParameterError
-        With one sentence about the first thing that is wrong.
+    are expected. Raises ParameterError with one sentence about the first thing that is wrong.
     """
     from pydantic import ValidationError
 
@@ -72,10 +64,8 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
 def require_values(document: Mapping[str, Any], model: type, leave_out: Sequence[str] = ()) -> None:
     """Check some of the keys of a document, each by itself.
 
-    Raises
-    ------
-    ParameterError
-        With one sentence about the first that is unknown or `leave_out`, or whose value is wrong.
+    Raises ParameterError with one sentence about the first that is unknown or `leave_out`, or whose
+    value is wrong.
     """
     from pydantic import ValidationError
 

@@ -108,12 +108,8 @@ def parameters(cls: type[T]) -> type[T]:
 
     Numbers of NumPy become Python's, and lists become tuples, where these are annotated. A check of
     several values belongs in `__post_init__`, which raises ValueError with what is wrong; then the
-    sentence begins with the place of the dataclass.
-
-    Raises
-    ------
-    UserError
-        On construction, with one sentence about the first value that is not admitted.
+    sentence begins with the place of the dataclass. Raises UserError on construction, with one
+    sentence about the first value that is not admitted.
     """
     made: Any = dataclass(frozen=True)(cls)
     names = [field.name for field in dataclasses.fields(made)]

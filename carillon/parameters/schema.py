@@ -20,10 +20,7 @@ _LIMITS = {
 def schema_of(model: type, meaning: str = "") -> dict[str, Any]:
     """JSON schema (2020-12) of the documents that describe a model, without references.
 
-    Parameters
-    ----------
-    meaning
-        Description; by default the first sentence of the model's docstring.
+    `meaning`: description; by default the first sentence of the model's docstring.
     """
     known = parameters_of(model)
     first = " ".join((model.__doc__ or "").partition("\n\n")[0].split()).removesuffix(".")

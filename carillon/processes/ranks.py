@@ -17,10 +17,7 @@ _LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 def world() -> Comm | None:
     """All ranks of this job; None unless it has several.
 
-    Raises
-    ------
-    UserError
-        If a launcher started several ranks and there is no mpi4py.
+    Raises UserError if a launcher started several ranks and there is no mpi4py.
     """
     launched = any(os.environ.get(name, "1") != "1" for name in _LAUNCHERS)
     if not launched and "mpi4py" not in sys.modules:

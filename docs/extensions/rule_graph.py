@@ -52,10 +52,7 @@ def pairs(graph: str) -> list[tuple[str, str]]:
 def draw(arrows: list[tuple[str, str]]) -> str:
     """The rules as SVG, from the first to the last.
 
-    Raises
-    ------
-    UserError
-        If Graphviz is not installed.
+    Raises UserError if Graphviz is not installed.
     """
     lines = [STYLE, *(f"{first} -> {then}" for first, then in arrows)]
     graph = "digraph rules {\n" + "\n".join(lines) + "\n}\n"

@@ -17,9 +17,7 @@ from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import load_surface, surface_name
-from carillon.fem.geometry.builtin import BUILTINS
-from carillon.fem.geometry.thin import THIN
-from carillon.fem.geometry.trials import TRIALS
+from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.parameters import option, parameters
 from solver.accuracy.estimate import estimate_cell_errors

@@ -151,7 +151,7 @@ def test_the_study_is_no_part_of_the_default_run(plan):
 
 
 def test_the_trial_solids_are_all_studied():
-    from carillon.fem.geometry.trials import TRIALS
+    from carillon.fem.geometry.builtin import TRIALS
 
     config = settings.complete([LAPTOP])
     meshes = [model["mesh"] for model in config["coarsening"]["models"].values()]

@@ -9,20 +9,17 @@ integrals over it are added to the neighbour's, of whose polynomials nothing is 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.joining import Faces
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, points, polynomials
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 FARTHEST = 3
 """Cells away from a part that one may be that takes it in."""
 
 
-def hosts(faces: Faces, slight: NDArray[np.bool_], volumes: Array) -> Index:
+def hosts(faces: Faces, slight: Flags, volumes: Array) -> Index:
     """Part (p,) that takes each in: itself unless it is slight, -1 where there is none.
 
     It is the largest among the neighbours, or that takes in a neighbour.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from carillon.arrays import Surface
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.cover import cover_of
@@ -16,9 +16,6 @@ from carillon.fem.finite_cells.pieces import CUT, FULL
 from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
 
 LOST = 1.1
 """Ratio of the volumes by two halves of the lines beyond which parts slip between the lines."""
@@ -34,7 +31,7 @@ PIECES_GRID = 200_000
 
 
 def covering(
-    surface: trimesh.Trimesh,
+    surface: Surface,
     resolution: int,
     components: str = "error",
     name: str = "mesh",
@@ -74,13 +71,16 @@ def covering(
 
 
 def finite_cells(
-    surface: trimesh.Trimesh,
+    surface: Surface,
     resolution: int,
     components: str = "error",
     name: str = "mesh",
     grid: Grid | None = None,
 ) -> FiniteCells:
     """Cover the inside of a surface with quadratic cells.
+
+    Raises UserError if the resolution is not an integer >= 2 or needs too large a lattice, if the
+    surface encloses nothing, or walls too thin for the lattice, or the solid is in pieces.
 
     Parameters
     ----------
@@ -97,12 +97,6 @@ def finite_cells(
         Lattice of about this resolution around the solid, with an even number of voxels along each
         axis; `even_grid` if None.
 
-    Raises
-    ------
-    UserError
-        If the resolution is not an integer >= 2 or needs too large a lattice, if the surface
-        encloses nothing, or walls too thin for the lattice, or the solid is in pieces.
-
     Examples
     --------
     >>> from carillon.fem.geometry.builtin import builtin_surface
@@ -113,7 +107,7 @@ def finite_cells(
     return covering(surface, resolution, components, name, grid).cells
 
 
-def even_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
+def even_grid(surface: Surface, resolution: int) -> Grid:
     """The bounding grid, centred, with an even number of voxels along each axis."""
     grid = bounding_grid(surface, resolution)
     shape = np.array(grid.shape)
@@ -131,7 +125,7 @@ def _holds(inside: Inside) -> bool:
     return 0.0 < min(volumes) and max(volumes) <= LOST * min(volumes)
 
 
-def _seen_share(surface: trimesh.Trimesh, inside: Inside, grid: Grid) -> float:
+def _seen_share(surface: Surface, inside: Inside, grid: Grid) -> float:
     """Volume by the lines over that of the surface; 1 unless this is one closed shell."""
     if not surface.is_watertight:  # Triangles may have vertices of their own.
         surface = surface.copy(include_cache=False)
@@ -142,7 +136,7 @@ def _seen_share(surface: trimesh.Trimesh, inside: Inside, grid: Grid) -> float:
     return float((full + 0.5 * sum(inside.volumes())) * grid.edge**3 / abs(surface.volume))
 
 
-def _unseen(surface: trimesh.Trimesh, share: float, resolution: int, grid: Grid, name: str) -> str:
+def _unseen(surface: Surface, share: float, resolution: int, grid: Grid, name: str) -> str:
     better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
     remedy = f"to {better}" if better else "or turn the solid"
     return (
@@ -151,7 +145,7 @@ def _unseen(surface: trimesh.Trimesh, share: float, resolution: int, grid: Grid,
     )
 
 
-def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
+def _lost(surface: Surface, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
     start = f"mesh {name!r} at resolution {resolution}"
     nothing = f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
     if inside.sheet:
@@ -170,7 +164,7 @@ def _lost(surface: trimesh.Trimesh, inside: Inside, resolution: int, grid: Grid,
     return nothing
 
 
-def _in_pieces(surface: trimesh.Trimesh, volumes: np.ndarray, resolution: int, name: str) -> str:
+def _in_pieces(surface: Surface, volumes: np.ndarray, resolution: int, name: str) -> str:
     listed = ", ".join(f"{volume:,.0f}" for volume in sorted(volumes)[:-5:-1])
     # A piece for each closed shell: these are apart, and no lattice joins them.
     apart = 1 < surface.body_count <= len(volumes)
@@ -188,7 +182,7 @@ def _is_one_piece(inside: Inside) -> bool:
 
 
 def _better_resolution(
-    surface: trimesh.Trimesh, resolution: int, accepts: Callable[[Inside], bool], largest: int
+    surface: Surface, resolution: int, accepts: Callable[[Inside], bool], largest: int
 ) -> int | None:
     """A higher resolution that `accepts` what is inside, on a grid of at most `largest` voxels."""
     for factor in TRIAL_FACTORS:

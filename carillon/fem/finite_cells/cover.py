@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index, Surface
 from carillon.fem.finite_cells.inside import Inside, find_inside
 from carillon.fem.finite_cells.parts import Labels, find_parts, meetings, meetings_of_halves
 from carillon.fem.finite_cells.pieces import EMPTY, FULL, SKIPPED
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.finite_cells.weights import weights_of_parts
 from carillon.fem.geometry.grid import Grid
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 SMALLEST_OCTANT = 1e-6
 """Share of a voxel below which it counts as empty."""
@@ -62,7 +56,7 @@ class LatticeCover:
     row: Index
     weights: Array
     met: Index
-    slight: NDArray[np.bool_]
+    slight: Flags
 
     def __len__(self) -> int:
         return len(self.row)
@@ -147,7 +141,7 @@ def _with_meetings(cover: LatticeCover, numbers: Index) -> LatticeCover:
     return replace(cover, met=np.concatenate(met))
 
 
-def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> LatticeCover:
+def divided_cover(surface: Surface, grid: Grid, places: Index) -> LatticeCover:
     """Cover by cells of half the edge where those of a lattice at `places` (d, 3) are divided.
 
     Its places are in voxels of half the edge, from the same origin.
@@ -166,7 +160,7 @@ def divided_cover(surface: trimesh.Trimesh, grid: Grid, places: Index) -> Lattic
     return replace(found, places=found.places + 2 * low)
 
 
-def faces_of_halves(whole: LatticeCover, half: LatticeCover, undivided: NDArray[np.bool_]) -> Index:
+def faces_of_halves(whole: LatticeCover, half: LatticeCover, undivided: Flags) -> Index:
     """Parts of undivided cells (c,) and of cells of half the edge that meet: rows (k, 4).
 
     They are as in `carillon.fem.finite_cells.joining.Faces`.

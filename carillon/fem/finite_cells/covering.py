@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index, Surface
 from carillon.errors import UserError
 from carillon.fem.finite_cells.absorbing import hosts, taken_in
 from carillon.fem.finite_cells.cells import FiniteCells, assemble_cells
@@ -16,12 +16,6 @@ from carillon.fem.finite_cells.cover import LatticeCover, divided_cover, faces_o
 from carillon.fem.finite_cells.descent import parents, voxels_of_parents
 from carillon.fem.finite_cells.joining import Faces, joined_nodes
 from carillon.fem.geometry.grid import Grid
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 SMALLEST_PIECE = 0.5
 """Volume [voxels] below which a loose piece is a crumb, and left out."""
@@ -62,11 +56,11 @@ class Covering:
         Which parts are of the solid.
     """
 
-    surface: trimesh.Trimesh
+    surface: Surface
     name: str
     grid: Grid
     cover: LatticeCover
-    kept: NDArray[np.bool_]
+    kept: Flags
 
     @cached_property
     def cells(self) -> FiniteCells:
@@ -76,10 +70,7 @@ class Covering:
     def divided(self, places: Index) -> Division:
         """The same, but with cells at `places` (d, 3), their lowest voxels, divided into eight.
 
-        Raises
-        ------
-        UserError
-            If the finer lattice shows that the solid is in pieces.
+        Raises UserError if the finer lattice shows that the solid is in pieces.
         """
         places = self._with_guests(places)
         whole, half = self.cover, divided_cover(self.surface, self.grid, places)
@@ -103,7 +94,7 @@ class Covering:
         guests = parts.slight & (host >= 0) & there[self.cover.owner[self.kept]][host]
         return np.unique(np.concatenate([places, parts.corner[guests]]), axis=0)
 
-    def _one_piece(self, parts: CellParts, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _one_piece(self, parts: CellParts, leaves: Flags) -> Flags:
         """Those of the `leaves` (p,) that are of the largest piece; the others must be crumbs."""
         own = np.flatnonzero(leaves)
         piece = parts.faces.chosen(leaves).pieces(len(own))
@@ -138,7 +129,7 @@ class CellParts:
     span: Index
     row: Index
     volumes: Array
-    slight: NDArray[np.bool_]
+    slight: Flags
     weights: Array
     faces: Faces
 
@@ -150,9 +141,7 @@ class CellParts:
         return cls(cover.grid, span, cover.row, cover.volumes, cover.slight, cover.weights, faces)
 
     @classmethod
-    def of_two(
-        cls, whole: LatticeCover, half: LatticeCover, undivided: NDArray[np.bool_]
-    ) -> CellParts:
+    def of_two(cls, whole: LatticeCover, half: LatticeCover, undivided: Flags) -> CellParts:
         """Those of a lattice and of one of half the edge, in place of its cells not `undivided`."""
         count, rows = len(whole), len(whole.weights)
         return cls(
@@ -168,7 +157,7 @@ class CellParts:
             ),
         )
 
-    def chosen(self, kept: NDArray[np.bool_]) -> CellParts:
+    def chosen(self, kept: Flags) -> CellParts:
         """Those that are kept (p,)."""
         return replace(
             self,

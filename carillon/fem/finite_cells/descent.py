@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Flags, Index
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.cover import LatticeCover
 
-Index = NDArray[np.int64]
 
-
-def parents(whole: LatticeCover, half: LatticeCover, kept: NDArray[np.bool_]) -> Index:
+def parents(whole: LatticeCover, half: LatticeCover, kept: Flags) -> Index:
     """Part (p,) of `whole` that each part of `half` lies in: of those kept, that with most in it.
 
     Where none has anything there it is the first that is kept in the place, or the first of all.

@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import CORNER_NODES, NODES
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.shapes import NODE_PLACES, lagrange
-
-Array = NDArray[np.float64]
 
 _STRIDE = np.array([1, 3, 9])
 
@@ -28,7 +27,7 @@ BITS = 1 << np.arange(len(NODES), dtype=np.int64)
 """Bit of each node in a kind."""
 
 
-def kinds_of_cells(octants: NDArray[np.integer], hangs: NDArray[np.bool_]) -> NDArray[np.int64]:
+def kinds_of_cells(octants: NDArray[np.integer], hangs: Flags) -> Index:
     """Kind (c,) of each cell: its place (c,) in one of twice the edge, and which (c, 27) hang.
 
     It is 0 where nothing hangs, whatever the place.
@@ -37,20 +36,20 @@ def kinds_of_cells(octants: NDArray[np.integer], hangs: NDArray[np.bool_]) -> ND
     return np.where(mask > 0, mask + octants * 2 ** len(NODES), 0)
 
 
-def node_places(kinds: NDArray[np.int64]) -> NDArray[np.int64]:
+def node_places(kinds: Index) -> Index:
     """Places (c, 27, 3) of the nodes from the lowest corner of each cell, in halves of its edge."""
     octants, hangs = _parts(kinds)
     return np.where(hangs[:, :, None], _beyond()[octants], NODES)
 
 
-def node_weights(kinds: NDArray[np.int64]) -> Array:
+def node_weights(kinds: Index) -> Array:
     """Weights (c, 27, 27) of the nodes, the columns, in what a cell says at its own 27 places."""
     octants, hangs = _parts(kinds)
     return np.where(hangs[:, :, None], _weights()[octants], np.eye(len(NODES)))
 
 
 def corners_of(
-    kinds: NDArray[np.int64], nodes: NDArray[np.integer]
+    kinds: Index, nodes: NDArray[np.integer]
 ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     """Corners (c, 8) of cells with these nodes (c, 27), and which of them hang, in bits (c,).
 
@@ -67,7 +66,7 @@ def corners_of(
     return corners.astype(np.int32), bits
 
 
-def at_nodes(matrices: Array, kinds: NDArray[np.int64]) -> Array:
+def at_nodes(matrices: Array, kinds: Index) -> Array:
     """Matrices (c, 27 d, 27 d) of cells between their nodes, from those between their own places.
 
     Displacement components follow each other at every node.
@@ -83,12 +82,12 @@ def at_nodes(matrices: Array, kinds: NDArray[np.int64]) -> Array:
     return matrices
 
 
-def _parts(kinds: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _parts(kinds: Index) -> tuple[Index, Flags]:
     return kinds >> len(NODES), (kinds[:, None] & BITS) > 0
 
 
 @cache
-def _beyond() -> NDArray[np.int64]:
+def _beyond() -> Index:
     """Places (8, 27, 3) of what replaces each node that hangs, see `node_places`."""
     ends = np.where(CORNERS.astype(bool), -2, 4)
     return np.where(NODES == 1, ends[:, None, :], NODES)

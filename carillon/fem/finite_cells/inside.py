@@ -7,12 +7,12 @@ crossings tell it; see `carillon.fem.finite_cells.open_surfaces` for others.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Flags, Surface
 from carillon.fem.finite_cells.lines import (
     LINES,
     Crossings,
@@ -28,9 +28,6 @@ from carillon.fem.finite_cells.open_surfaces import (
 from carillon.fem.finite_cells.pieces import CUT, EMPTY, FULL, SKIPPED, Pieces, joined, points_on
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.winding import Winding
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
 
 
 @dataclass(frozen=True)
@@ -66,9 +63,7 @@ class Inside:
         return float(halves[0]), float(halves[1])
 
 
-def find_inside(
-    surface: trimesh.Trimesh, grid: Grid, wanted: NDArray[np.bool_] | None = None
-) -> Inside:
+def find_inside(surface: Surface, grid: Grid, wanted: Flags | None = None) -> Inside:
     """The inside of a surface, which may have holes and overlapping shells.
 
     The lattice holds all of the surface, unless it is told which voxels are `wanted` (nx, ny, nz).
@@ -133,7 +128,7 @@ def _between_crossings(start, place, step):  # type: ignore[no-untyped-def]
     return low, high, owner, certain
 
 
-def _middles(pieces: Pieces, shape: tuple[int, int, int]) -> NDArray[np.bool_]:
+def _middles(pieces: Pieces, shape: tuple[int, int, int]) -> Flags:
     """Voxels (nx, ny, nz) whose middle is inside, as their first line along x sees it."""
     return np.asarray(
         _middles_inside(pieces.start, pieces.low, pieces.high, pieces.columns, LINES, shape)

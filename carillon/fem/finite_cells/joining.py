@@ -9,9 +9,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from carillon.arrays import Flags, Index
 from carillon.fem.block import NODES
-
-Index = NDArray[np.int64]
 
 _COUNT = len(NODES)
 _STRIDE = np.array([1, 3, 9])
@@ -33,7 +32,7 @@ class Faces:
     alike: Index
     unlike: Index
 
-    def chosen(self, kept: NDArray[np.bool_]) -> Faces:
+    def chosen(self, kept: Flags) -> Faces:
         """Those between cells that are kept, by their new numbers."""
         number = np.cumsum(kept) - 1
         faces = []
@@ -48,17 +47,12 @@ class Faces:
         return _components(count, pairs[:, 0], pairs[:, 1])
 
 
-def joined_nodes(
-    corner: Index, span: Index, faces: Faces, slight: NDArray[np.bool_]
-) -> tuple[Index, Index]:
+def joined_nodes(corner: Index, span: Index, faces: Faces, slight: Flags) -> tuple[Index, Index]:
     """Nodes (c, 27) of cells, and the places (n, 3) of the nodes, ordered by (z, y, x).
 
     Some cells are so slight (p,) that they are not among the c, but they hold others together.
-
-    Parameters
-    ----------
-    corner, span : (c, 3), (c,)
-        Lowest corners and edges, in steps of which an edge has an even number.
+    `corner`, `span` (c, 3), (c,): lowest corners and edges, in steps of which an edge has an even
+    number.
     """
     count = _COUNT * len(corner)
     own = _COUNT * np.arange(len(corner))[:, None] + np.arange(_COUNT)

@@ -14,10 +14,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.geometry.crossings import line_crossings
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 LINES = 8
 """Lines along each side of a voxel. Even, so that none lies in its plane of symmetry."""

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import NODES
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.elements import Chosen, Elements
@@ -18,8 +19,6 @@ from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import DEFAULT_DENSITY, Solid
 from carillon.fem.moduli import require_moduli
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,28 +45,24 @@ class CellElements(Elements):
     poisson: float
     density: float
     span: NDArray[np.int32] | None = None
-    kinds: NDArray[np.int64] | None = None
+    kinds: Index | None = None
 
     def of(self, *arrays: NDArray[Any]) -> Self:
-        """See `Elements.of`."""
         young, share, *sizes = arrays
         span, kinds = sizes or (None, None)
         return replace(self, young=young, share=share, span=span, kinds=kinds)
 
     def arrays(self) -> list[NDArray[Any]]:
-        """See `Elements.arrays`."""
         if self.span is None or self.kinds is None:
             return [self.young, self.share]
         return [self.young, self.share, self.span, self.kinds]
 
     @property
     def steps(self) -> int:
-        """See `Elements.steps`."""
         return 2 if self.span is None else 4
 
     @property
-    def node_places(self) -> NDArray[np.int64]:
-        """Places (c, 27, 3) of the nodes in each cell, in steps."""
+    def node_places(self) -> Index:
         if self.span is None or self.kinds is None:
             return np.broadcast_to(NODES, (len(self), *NODES.shape))
         return node_places(self.kinds) * (self.span // 2)[:, None, None]
@@ -82,22 +77,19 @@ class CellElements(Elements):
         return matrices if self.kinds is None else at_nodes(matrices, self.kinds[chosen])
 
     @property
-    def collinear(self) -> NDArray[np.bool_]:
-        """All: there are three nodes on an edge."""
-        return np.ones(len(self), dtype=bool)
+    def collinear(self) -> Flags:
+        return np.ones(len(self), dtype=bool)  # there are three nodes on an edge
 
     @property
-    def sort_key(self) -> NDArray[np.int64]:
-        """None is needed: parts in one place have a node of their own in their middle."""
+    def sort_key(self) -> Index:
+        # None is needed: parts in one place have a node of their own in their middle.
         return np.zeros(len(self), dtype=np.int64)
 
     def stiffness(self, chosen: Chosen = slice(None)) -> Array:
-        """Stiffness matrices (c, 81, 81) [N/m] of the chosen cells."""
         matrices = (self._edges(chosen) * self.young[chosen]) @ point_stiffness(self.poisson)
         return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
 
     def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
-        """Masses (c, 27, 27) [kg] of the chosen cells."""
         scale = self.density * self._edges(chosen) ** 3
         matrices = (scale * self.share[chosen]) @ point_mass()
         return self._between_nodes(matrices.reshape(-1, 27, 27), chosen)
@@ -125,12 +117,11 @@ class FiniteCellModel(Solid):
 
     @property
     def mesh(self) -> HexMesh:  # type: ignore[override]
-        """The voxels that hold material, and all nodes."""
         return self.cells.mesh
 
     @cached_property
     def elements(self) -> CellElements:
-        """See `Solid.elements`; made once, since the weights of all cells go into them."""
+        # Made once, since the weights of all cells go into them.
         return CellElements(
             self.cells.point_values(self.young),
             self.cells.point_values(np.ones(self.mesh.n_cells)),
@@ -143,37 +134,30 @@ class FiniteCellModel(Solid):
 
     @property
     def connectivity(self) -> NDArray[np.int32]:
-        """Nodes (c, 27) of each cell."""
         return np.asarray(self.cells.nodes)
 
     @property
     def hexmesh(self) -> HexMesh:
-        """See `Solid.hexmesh`."""
         return self.cells.hexmesh()
 
     @property
-    def filled(self) -> NDArray[np.bool_]:
-        """See `Solid.filled`."""
+    def filled(self) -> Flags:
         return np.asarray(self.cells.voxels >= 0)
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        """Quadratic weights (p, 27), see `Solid.shape_values`."""
         values = shape_functions(places)
         if self.cells.kinds is None:
             return values
         return np.asarray(values[:, None] @ node_weights(self.cells.kinds[elements]))[:, 0]
 
     def element_moduli(self, young: Array) -> Array:
-        """Weighted moduli (c, 125) [Pa] of the cells from those (m,) of the voxels; see `Solid`."""
         return self.cells.point_values(require_moduli(young, self.mesh.n_cells, points=False))
 
     def with_young(self, young: Array) -> Self:
-        """The same solid with other moduli (m,) [Pa]; see `Solid`."""
         return replace(self, young=require_moduli(young, self.mesh.n_cells, points=False))
 
     @property
     def mass(self) -> float:
-        """Mass of the solid [kg]."""
         return self.density * self.cells.volume
 
 
@@ -185,10 +169,7 @@ def finite_cell_model(
 ) -> FiniteCellModel:
     """Solid of finite cells with moduli `young` (m,) [Pa] of the voxels.
 
-    Raises
-    ------
-    UserError
-        For what `carillon.fem.moduli.require_moduli` refuses.
+    Raises UserError for what `carillon.fem.moduli.require_moduli` refuses.
 
     Examples
     --------

@@ -10,13 +10,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import LINES, Crossings, Lines
 from carillon.fem.finite_cells.pieces import CUT, EMPTY, FULL, SKIPPED, Pieces, joined, points_on
 from carillon.fem.geometry.winding import INSIDE, Winding
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 ENDS = 0.02
 """Share of a piece of a line by which its ends are moved inwards to see whether they are inside."""
@@ -99,9 +97,7 @@ def encloses(pieces: Pieces, wind: Winding) -> bool:
     return bool(np.abs(wind(points_on(pieces, line, middles))).max() > SHEET)
 
 
-def _rim(
-    lines: Lines, line: Index, low: Array, high: Array, begins: NDArray[np.bool_], wind: Winding
-) -> Array:
+def _rim(lines: Lines, line: Index, low: Array, high: Array, begins: Flags, wind: Winding) -> Array:
     """Places (p,) where pieces that begin inside, or end there, pass the rim of a hole."""
     share = np.linspace(0.0, 1.0, RIM_POINTS)[:, None]
     places = low + (ENDS + (1.0 - 2.0 * ENDS) * share) * (high - low)

@@ -11,11 +11,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.finite_cells.lines import LINES
 from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Labels = NDArray[np.int16]
 
 SLIVER = 1e-4
@@ -59,10 +58,8 @@ def find_parts(
 def meetings(lower: Index, upper: Index, labels: Labels, axis: int) -> Index:
     """Parts that meet at the faces between cells: rows (pair, part below, part above).
 
-    Parameters
-    ----------
-    lower, upper : (p,)
-        Cells of `labels` on the two sides along the axis; -1 is one that is all inside.
+    `lower`, `upper` (p,): cells of `labels` on the two sides along the axis; -1 is one that is all
+    inside.
     """
     found = _meetings(lower, upper, labels, axis)
     return np.array(found, dtype=np.int64).reshape(-1, 3)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.finite_cells.lines import Lines
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 EMPTY, CUT, FULL, SKIPPED = 0, 1, 2, 3
 """States of a voxel; skipped are those that nobody asked for."""

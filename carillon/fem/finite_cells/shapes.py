@@ -12,12 +12,10 @@ from __future__ import annotations
 from functools import cache, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, frozen
 from carillon.fem.block import NODES
 from carillon.fem.element import CORNERS, KEPT, elasticity_matrix, strain_displacement
-
-Array = NDArray[np.float64]
 
 POINTS = 125
 """Points that the integrals over a cell are taken from; i + 5 j + 25 k is at i, j, k along x, y,
@@ -102,7 +100,7 @@ def octant_weights() -> Array:
         for half in range(2)
     ]
     octants = [_products([halves[bit][None] for bit in corner])[0] for corner in CORNERS]
-    return _kept(np.array(octants))
+    return frozen(np.array(octants))
 
 
 @lru_cache(KEPT)
@@ -112,23 +110,18 @@ def strain_factors(poisson: float) -> Array:
     A cell of edge h with weighted moduli w_p [Pa] has the stiffness ``h * sum_p w_p B_p^T B_p``.
     """
     root = np.linalg.cholesky(elasticity_matrix(poisson)).T
-    return _kept(root @ strain_displacement(shape_gradients(points())))
+    return frozen(root @ strain_displacement(shape_gradients(points())))
 
 
 @lru_cache(KEPT)
 def point_stiffness(poisson: float) -> Array:
     """B_p^T B_p (125, 81 * 81), see `strain_factors`."""
     factors = strain_factors(poisson)
-    return _kept((factors.transpose(0, 2, 1) @ factors).reshape(POINTS, -1))
+    return frozen((factors.transpose(0, 2, 1) @ factors).reshape(POINTS, -1))
 
 
 @cache
 def point_mass() -> Array:
     """N_p^T N_p (125, 27 * 27) of the shape functions N at the points."""
     values = shape_functions(points())
-    return _kept((values[:, :, None] * values[:, None, :]).reshape(POINTS, -1))
-
-
-def _kept(table: Array) -> Array:
-    table.setflags(write=False)
-    return table
+    return frozen((values[:, :, None] * values[:, None, :]).reshape(POINTS, -1))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.shapes import points
-
-Array = NDArray[np.float64]
 
 
 def centroids(cells: FiniteCells) -> tuple[Array, Array]:

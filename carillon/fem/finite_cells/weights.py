@@ -6,6 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.finite_cells.lines import LINES, Spread
 from carillon.fem.finite_cells.parts import Labels, box_bounds
 from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
@@ -16,9 +17,6 @@ from carillon.fem.finite_cells.shapes import (
     lagrange,
     octant_weights,
 )
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 def weights_of_parts(

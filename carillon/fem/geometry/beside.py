@@ -12,40 +12,30 @@ from carillon.limits import MESH_BYTES
 
 
 class Beside:
-    """Regular files in the folder of a mesh, which end, as pipes may not.
-
-    Attributes
-    ----------
-    read
-        Bytes that they have taken so far, the mesh itself included.
-    """
+    """Regular files in the folder of a mesh, which end, as pipes may not."""
 
     def __init__(self, mesh: Path) -> None:
         self._mesh = mesh
         self._folder = FilePathResolver(str(mesh))
-        self.read = mesh.stat().st_size
+        self._read = mesh.stat().st_size
 
     def get(self, name: str, length: int | None) -> bytes:
         """The first `length` bytes of the file `name`, all of them if that is None.
 
-        Raises
-        ------
-        UserError
-            If they are too many, which is seen before they are read.
-        ValueError
-            If there is no such file in the folder, or it is shorter.
+        Raises UserError if they are too many, which is seen before they are read, and ValueError if
+        there is no such file in the folder, or it is shorter.
         """
         path = self._found(name)
         size = path.stat().st_size
         length = size if length is None else length
         if not 0 <= length <= size:
             raise ValueError(f"the file {name!r} has {size:,} bytes, the mesh says {length:,}")
-        if self.read + length > MESH_BYTES:
+        if self._read + length > MESH_BYTES:
             raise UserError(
-                f"{self._mesh}: is {self.read + length:,} bytes with the file {name!r} that it "
+                f"{self._mesh}: is {self._read + length:,} bytes with the file {name!r} that it "
                 f"names, expected at most {MESH_BYTES:,}; simplify the mesh"
             )
-        self.read += length
+        self._read += length
         with open(path, "rb") as stream:
             return stream.read(length)
 

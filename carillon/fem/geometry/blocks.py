@@ -34,8 +34,8 @@ class Blocks:
     fine_of_block : (mc, 8) int32
         Index of the fine cell at position ``x + 2*y + 4*z`` of an element, -1 where it holds none.
     contacts : (mc,) uint8
-        Bit d tells whether the element meets another one in direction ``faces.DIRECTIONS[d]``: a
-        face of its fine cells is one of the other's.
+        Bit d tells whether the element meets another one at face d of `faces.FACE_CORNERS`: a face
+        of its fine cells is one of the other's.
     """
 
     fine: HexMesh
@@ -80,11 +80,8 @@ def parts_of_patterns() -> np.ndarray:
 def blocks_from_mesh(fine: HexMesh, refined: np.ndarray | None = None) -> Blocks:
     """Pair `fine` with its coarse mesh; a block starts at every even cell coordinate.
 
-    Parameters
-    ----------
-    refined : (mc,) bool
-        Elements of the coarse mesh, as it is without this, that shall be fine; the other parts of
-        their blocks become so as well. With any, `coarse` is a mixed mesh.
+    `refined` (mc,) bool: elements of the coarse mesh, as it is without this, that shall be fine;
+    the other parts of their blocks become so as well. With any, `coarse` is a mixed mesh.
 
     Examples
     --------

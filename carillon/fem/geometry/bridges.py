@@ -9,23 +9,16 @@ the other near it. Gaps narrower than about 0.6 voxels may lie between two such 
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index, Surface
 from carillon.command_line.logs import warn_once
 from carillon.fem.geometry.fill import SAMPLES
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.samples import SamplePoints
 from carillon.fem.geometry.touching import touched_voxels
 from carillon.fem.geometry.voxels import VoxelModel
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 NEAR = 4
 """Voxels around a joint within which points inside may lead from one side to the other."""
@@ -35,7 +28,7 @@ MOST_JOINTS = 200
 """Joints that are looked at."""
 
 
-def say_bridged(surface: trimesh.Trimesh, voxels: VoxelModel) -> None:
+def say_bridged(surface: Surface, voxels: VoxelModel) -> None:
     """Warn of a gap of the surface that the voxels close."""
     joint = bridge(surface, voxels)
     if joint is not None:
@@ -46,13 +39,10 @@ def say_bridged(surface: trimesh.Trimesh, voxels: VoxelModel) -> None:
         )
 
 
-def bridge(surface: trimesh.Trimesh, voxels: VoxelModel) -> NDArray[np.float64] | None:
+def bridge(surface: Surface, voxels: VoxelModel) -> Array | None:
     """Middle (3,) [m] of a face across which voxels join what is apart; None if there is none.
 
-    Parameters
-    ----------
-    surface
-        Triangles in metres, whose voxels they are.
+    `surface`: triangles in metres, whose voxels they are.
 
     Examples
     --------
@@ -73,7 +63,7 @@ def bridge(surface: trimesh.Trimesh, voxels: VoxelModel) -> NDArray[np.float64] 
     return None
 
 
-def _inside(surface: trimesh.Trimesh, voxels: VoxelModel) -> Flags:
+def _inside(surface: Surface, voxels: VoxelModel) -> Flags:
     """Whether the sample points of filled voxels, along each axis, are inside the surface."""
     grid = Grid(voxels.origin, voxels.edge, voxels.shape)
     corners, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)

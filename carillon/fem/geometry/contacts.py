@@ -7,24 +7,16 @@ happens to lie.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index, Surface
 from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from carillon.fem.geometry.crossings import line_crossings
 from carillon.fem.geometry.facets import Facets, connected
 from carillon.fem.geometry.parts import ClosedPart, closed_parts, winding_numbers
 from carillon.fem.geometry.pinches import MOST_EDGES, pinches
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 TOUCHING = 1e-7
 """Distance, over the longest side, of a corner from another body up to which the two touch."""
@@ -42,10 +34,11 @@ MOST_PARTS = 100
 """Parts beyond which no contacts are sought."""
 
 
-def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Trimesh:
+def one_body(surface: Surface, components: str, name: str) -> Surface:
     """The surface, without bodies that touch its largest one along edges or in points alone.
 
-    A body that touches itself along edges is warned of.
+    A body that touches itself along edges is warned of. Raises UserError if there are such bodies
+    and `components` is ``"error"``.
 
     Parameters
     ----------
@@ -53,11 +46,6 @@ def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Tr
         ``"largest"`` leaves the others out.
     name
         Of the mesh, for messages.
-
-    Raises
-    ------
-    UserError
-        If there are such bodies and `components` is ``"error"``.
     """
     facets = Facets.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), sheets=True)
     kept = _without_others(surface, facets, components, name)
@@ -67,7 +55,7 @@ def one_body(surface: trimesh.Trimesh, components: str, name: str) -> trimesh.Tr
     return kept
 
 
-def _say_pinched(surface: trimesh.Trimesh, facets: Facets, name: str) -> None:
+def _say_pinched(surface: Surface, facets: Facets, name: str) -> None:
     """Warn of edges along which a surface touches itself."""
     edges = pinches(facets) if len(facets) else np.empty((0, 2, 3))
     if not len(edges):
@@ -83,9 +71,7 @@ def _say_pinched(surface: trimesh.Trimesh, facets: Facets, name: str) -> None:
     )
 
 
-def _without_others(
-    surface: trimesh.Trimesh, facets: Facets, components: str, name: str
-) -> trimesh.Trimesh:
+def _without_others(surface: Surface, facets: Facets, components: str, name: str) -> Surface:
     parts = closed_parts(facets) if len(facets) and facets.patches.any() else []
     outer = [part for part in parts if part.volume > 0.0]
     if not 2 <= len(outer) <= MOST_PARTS:

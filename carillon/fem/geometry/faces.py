@@ -8,15 +8,10 @@ import numpy as np
 from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.geometry.hexmesh import HexMesh
 
-DIRECTIONS = np.array(
-    [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=np.int64
-)
-"""Directions that the six faces of a cell look in."""
-
 FACE_CORNERS = np.array(
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
 )
-"""Local corners of the faces, anticlockwise seen from outside."""
+"""Local corners of the faces at -x, x, -y, y, -z and z, anticlockwise seen from outside."""
 
 
 def face_neighbours(mesh: HexMesh) -> np.ndarray:
@@ -25,12 +20,12 @@ def face_neighbours(mesh: HexMesh) -> np.ndarray:
     In a mixed mesh these include fine cells at the face of an element of twice the edge, whose
     corners they have for nodes there, and cells of one block that share a face, whatever hangs.
     """
-    return np.concatenate(
-        [
-            _matches(_face_nodes(mesh, 2 * axis + 1), _face_nodes(mesh, 2 * axis), mesh.n_nodes + 1)
-            for axis in range(3)
-        ]
-    )
+    return np.concatenate([_neighbours_along(mesh, axis) for axis in range(3)])
+
+
+def _neighbours_along(mesh: HexMesh, axis: int) -> np.ndarray:
+    upper, lower = _face_nodes(mesh, 2 * axis + 1), _face_nodes(mesh, 2 * axis)
+    return np.asarray(_matches(upper, lower, mesh.n_nodes + 1))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -73,12 +68,13 @@ def boundary_faces(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
     """
     quads, cells = [], []
     size = np.ones(mesh.n_cells) if mesh.span is None else mesh.span.astype(float) ** 2
-    for face, corners in enumerate(FACE_CORNERS):
-        own, opposite = _face_numbers(mesh, face, face ^ 1)
-        covered = np.bincount(opposite, size, minlength=own.max(initial=0) + 1)[own]
-        is_open = np.flatnonzero(covered < size)
-        quads.append(mesh.cells[is_open][:, corners])
-        cells.append(is_open)
+    for axis in range(3):
+        upper, lower = _neighbours_along(mesh, axis).T
+        for face, own, beside in ((2 * axis, lower, upper), (2 * axis + 1, upper, lower)):
+            covered = np.bincount(own, size[beside], minlength=mesh.n_cells)
+            is_open = np.flatnonzero(covered < size)
+            quads.append(mesh.cells[is_open][:, FACE_CORNERS[face]])
+            cells.append(is_open)
     return np.concatenate(quads), np.concatenate(cells)
 
 
@@ -99,14 +95,6 @@ def surface_quads(mesh: HexMesh) -> np.ndarray:
     return boundary_faces(mesh)[0]
 
 
-def _face_numbers(mesh: HexMesh, *faces: int) -> np.ndarray:
-    """Numbers (len(faces), m) of the cells' faces in these directions: equal if one face."""
-    nodes = np.concatenate([_face_nodes(mesh, face) for face in faces])
-    first, second, third, fourth = nodes.astype(np.int64).T
-    numbers = _paired(_paired(first, second), _paired(third, fourth))
-    return numbers.reshape(len(faces), mesh.n_cells)
-
-
 def _face_nodes(mesh: HexMesh, face: int) -> np.ndarray:
     """Four ascending numbers (m, 4) that belong to each cell's face in a direction: its nodes.
 
@@ -123,9 +111,3 @@ def _face_nodes(mesh: HexMesh, face: int) -> np.ndarray:
     nodes[inner, 0] = mesh.cells[inner, position ^ 7]
     nodes[inner, 3] += position & ~(1 << axis)
     return nodes
-
-
-def _paired(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """One number for each distinct pair of numbers."""
-    pairs = left * (int(right.max(initial=0)) + 1) + right
-    return np.asarray(np.unique(pairs, return_inverse=True)[1].ravel())

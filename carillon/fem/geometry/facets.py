@@ -7,11 +7,8 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from carillon.arrays import Array, Flags, Index
 
 DIGITS = 7
 """Decimals, over the longest side, to which the places of two vertices agree that are one."""
@@ -45,10 +42,7 @@ class Facets:
     def of_surface(cls, vertices: Array, faces: Index, sheets: bool = False) -> Facets:
         """Distinct triangles of a surface with vertices (v, 3) and faces (f, 3).
 
-        Parameters
-        ----------
-        sheets
-            Tell closed sheets apart, see `closed_sheets`; otherwise all is one sheet.
+        `sheets`: tell closed sheets apart, see `closed_sheets`; otherwise all is one sheet.
         """
         from trimesh.grouping import unique_rows
 
@@ -124,13 +118,9 @@ def closed_sheets(corners: Index, faces: Index) -> Index:
     """Sheet (f,) of each face of those that are closed by themselves; one if any is open.
 
     Where sheets share edges, places do not tell which faces go on in which: sheets are told apart
-    by the vertices that their faces have in common, and by the order of the faces, since files
-    hold part after part.
-
-    Parameters
-    ----------
-    corners, faces : (f, 3)
-        Numbers of the places of the faces' corners, and of their vertices.
+    by the vertices that their faces have in common, and by the order of the faces, since files hold
+    part after part. `corners`, `faces` (f, 3): numbers of the places of the faces' corners, and of
+    their vertices.
 
     Examples
     --------

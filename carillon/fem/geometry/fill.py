@@ -11,17 +11,14 @@ least half full and, of the others, those without which the solid would lose a p
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from carillon.arrays import Surface
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.samples import SamplePoints
 from carillon.fem.geometry.topology import pieces, thin_to
 from carillon.fem.geometry.touching import touched_voxels
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
 
 #: Sample points per voxel edge for the filled fraction of a voxel. Odd, so that "half full" puts a
 #: wall at the middle of a voxel; an even number would move every wall outwards.
@@ -31,7 +28,7 @@ SAMPLES = 3
 TOO_THIN = 2.0
 
 
-def winding_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+def winding_fill(surface: Surface, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels at least half inside the surface, plus those that hold it together.
 
     Inside is where the generalised winding number exceeds `INSIDE` in magnitude (Jacobson et al.
@@ -72,12 +69,12 @@ def _length(voxels: np.ndarray) -> int:
     return int(np.ptp(cells, axis=0).max()) + 1 if len(cells) else 0
 
 
-def centre_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+def centre_fill(surface: Surface, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels whose centre is inside the surface by its winding number; thin parts may break off."""
     return SamplePoints(surface, grid, 1).centres(), grid.origin
 
 
-def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+def orthographic_fill(surface: Surface, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Voxels that the surface touches and all between them along every axis.
 
     Voxels are centred on multiples of the edge, so there is one more along the longest side, and
@@ -88,7 +85,7 @@ def orthographic_fill(surface: trimesh.Trimesh, grid: Grid) -> tuple[np.ndarray,
     return np.array(voxels.matrix, dtype=bool), origin
 
 
-FILLS: dict[str, Callable[[trimesh.Trimesh, Grid], tuple[np.ndarray, np.ndarray]]] = {
+FILLS: dict[str, Callable[[Surface, Grid], tuple[np.ndarray, np.ndarray]]] = {
     "winding": winding_fill,
     "centre": centre_fill,
     "orthographic": orthographic_fill,
@@ -106,7 +103,7 @@ def filled_fraction(samples: SamplePoints, touched: np.ndarray) -> np.ndarray:
     return fraction
 
 
-def cut_triangles(surface: trimesh.Trimesh, max_edge: float) -> float:
+def cut_triangles(surface: Surface, max_edge: float) -> float:
     """Number of triangles once every edge is cut to at most `max_edge` [m], see `cut`.
 
     Cutting halves all edges of a triangle until the longest one is short enough.

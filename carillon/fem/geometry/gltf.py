@@ -166,38 +166,22 @@ class _Data:
         self._bytes = bytearray()
 
     def add(self, values: NDArray[Any], component: int, kind: str) -> int:
-        """Number of an accessor for values of four bytes."""
         content = np.ascontiguousarray(values, dtype=_DTYPES[component]).tobytes()
-        self._views.append(
-            {"buffer": 0, "byteOffset": len(self._bytes), "byteLength": len(content)}
-        )
-        self._accessors.append(
-            {
-                "bufferView": len(self._views) - 1,
-                "componentType": component,
-                "count": len(values),
-                "type": kind,
-            }
-        )
+        accessor = {"bufferView": len(self._views), "componentType": component}
+        self._accessors.append({**accessor, "count": len(values), "type": kind})
+        view = {"buffer": 0, "byteOffset": len(self._bytes), "byteLength": len(content)}
+        self._views.append(view)
         self._bytes += content
         return len(self._accessors) - 1
 
     def glb(self, header: Header) -> bytes:
-        """The file with this header."""
         buffers = [{"byteLength": len(self._bytes)}]
         tables = {"accessors": self._accessors, "bufferViews": self._views, "buffers": buffers}
         text = json.dumps({**header, **tables}).encode()
         text = text.ljust(-(-len(text) // 4) * 4)
         length = 12 + 8 + len(text) + 8 + len(self._bytes)
-        return b"".join(
-            [
-                struct.pack("<4sII", _MAGIC, _VERSION, length),
-                struct.pack("<I4s", len(text), _JSON),
-                text,
-                struct.pack("<I4s", len(self._bytes), _BINARY),
-                bytes(self._bytes),
-            ]
-        )
+        start = struct.pack("<4sIII4s", _MAGIC, _VERSION, length, len(text), _JSON)
+        return start + text + struct.pack("<I4s", len(self._bytes), _BINARY) + self._bytes
 
 
 class _Reader:
@@ -208,18 +192,7 @@ class _Reader:
         self._read: dict[str, bytes] = {}
 
     def require_proportion(self, length: int) -> None:
-        """Check that the triangles take no more than some multiple of the bytes that there are.
-
-        Parameters
-        ----------
-        length
-            Of the file, to which the files are added that it names.
-
-        Raises
-        ------
-        UserError
-            If they take more.
-        """
+        """Refuse triangles that take far more bytes than a file of this length and those beside."""
         accessors = self._header.get("accessors", [])
         uses = Counter(node.get("mesh") for node in self._header.get("nodes", []))
         taken = 0

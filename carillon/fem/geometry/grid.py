@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
+from carillon.arrays import Surface
 
 ROUNDED = 1e-3
 """Part of a voxel by which sides may exceed whole voxels: files round coordinates."""
@@ -24,7 +21,7 @@ class Grid:
     shape: tuple[int, int, int]
 
 
-def bounding_grid(surface: trimesh.Trimesh, resolution: int) -> Grid:
+def bounding_grid(surface: Surface, resolution: int) -> Grid:
     """Grid with `resolution` voxels along the longest side of the bounding box, centred on it.
 
     Voxels are larger by as much as spares a layer of them for sides that exceed it by `ROUNDED`.

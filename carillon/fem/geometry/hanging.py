@@ -14,6 +14,8 @@ from functools import cache
 
 import numpy as np
 
+from carillon.arrays import frozen
+
 WHOLE = 8 * 256
 """Kind of an element that is no fine cell: of twice the edge, without hanging corners."""
 
@@ -23,10 +25,7 @@ _AXES = np.arange(8)[:, None] >> np.arange(3) & 1
 def kinds_of_cells(grid: np.ndarray, span: np.ndarray, hanging: np.ndarray) -> np.ndarray:
     """Kind (m,) int32 of each element: ``256 * position + hanging`` of a fine cell, or `WHOLE`.
 
-    Parameters
-    ----------
-    grid, span, hanging
-        See `HexMesh`.
+    `grid`, `span`, `hanging`: see `HexMesh`.
     """
     position = (grid & 1) @ np.array([1, 2, 4])
     return np.where(span == 1, 256 * position + hanging, WHOLE).astype(np.int32)
@@ -39,8 +38,7 @@ def node_places() -> np.ndarray:
     hangs = _hangs()[:, :, None]
     own = (_AXES[:, None] + _AXES)[:, None]
     places[:WHOLE] = np.where(hangs, 2 * _AXES, own).reshape(WHOLE, 8, 3)
-    places.setflags(write=False)
-    return places
+    return frozen(places)
 
 
 @cache
@@ -55,8 +53,7 @@ def node_weights() -> np.ndarray:
             mean = np.zeros(8)
             mean[ends] = 1.0 / len(ends)
             table[position, _hangs()[:, corner], corner] = mean
-    weights.setflags(write=False)
-    return weights
+    return frozen(weights)
 
 
 @cache

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import scipy.sparse as sp
 
+from carillon.fem.geometry.facets import connected
 from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
-from carillon.fem.geometry.refinement import hanging_corners, hanging_nodes
 
 
 @cache
@@ -48,7 +47,7 @@ def coarse_mesh(
     """Mesh of elements that lie in `part` (mc,), from those (m,) of the fine cells."""
     fine, corners = parts.fine, 8 * len(parts.owner)
     grid = 2 * parts.grid[parts.owner]
-    hanging = hanging_nodes(fine, parts.position, is_fine)
+    hanging = _hanging_nodes(fine, parts.position, is_fine)
     # Of the fine nodes these alone stay nodes; all others are corners of blocks.
     alone = is_fine[:, None] & ((fine.node_grid & 1).any(axis=1) & ~hanging)[fine.cells]
     own = np.unique(fine.cells[alone])
@@ -69,8 +68,30 @@ def coarse_mesh(
     span, mask = np.full(len(part), 2, dtype=np.uint8), np.zeros(len(part), dtype=np.uint8)
     grid[element[is_fine]] = fine.grid[is_fine]
     span[element[is_fine]] = 1
-    mask[element[is_fine]] = hanging_corners(hanging, fine.cells[is_fine])
+    bits = np.packbits(hanging[fine.cells[is_fine]], axis=1, bitorder="little")
+    mask[element[is_fine]] = bits.ravel()
     return HexMesh(cells, grid, places, fine.origin, fine.edge, span, mask)
+
+
+def _hanging_nodes(fine: HexMesh, position: np.ndarray, divided: np.ndarray) -> np.ndarray:
+    """Which nodes (n,) hang, as coarse elements are beside them, of fine cells that are `divided`.
+
+    `position` (m,) is that of each cell in its block.
+    """
+    beside = np.zeros(fine.n_nodes, dtype=bool)
+    beside[fine.cells[~divided]] = True
+    kept = np.zeros(fine.n_nodes, dtype=bool)
+    kept[fine.cells[divided]] = True
+    hanging = beside & kept & (fine.node_grid & 1).any(axis=1)
+    # The middle of a face is the mean of its corners: the edges of every cell there hang as well.
+    # They draw no other face along, so once is enough.
+    cells, corner = fine.cells[divided], position[divided]
+    own = np.arange(len(cells))
+    for a, b in ((1, 2), (1, 4), (2, 4)):
+        follow = hanging[cells[own, corner ^ a ^ b]]
+        for edge in (a, b):
+            hanging[cells[own, corner ^ edge][follow]] = True
+    return hanging
 
 
 def _joined_corners(parts: Parts, alone: np.ndarray) -> np.ndarray:
@@ -80,8 +101,6 @@ def _joined_corners(parts: Parts, alone: np.ndarray) -> np.ndarray:
     common. Cells of one block that share an edge only are not joined by it. Corners (m, 8) of cells
     that stand `alone` are not interpolated.
     """
-    from scipy.sparse.csgraph import connected_components  # Its import takes long.
-
     # A block's cells meet other blocks at nodes that lie on a plane between blocks.
     fine, position = parts.fine, parts.position
     between = (fine.node_grid & 1 == 0).any(axis=1)
@@ -103,8 +122,4 @@ def _joined_corners(parts: Parts, alone: np.ndarray) -> np.ndarray:
     np.maximum.at(high, key, blocks)
     joins = (low != high)[key]
     corners = 8 * len(parts.owner)
-    graph = sp.coo_matrix(
-        (np.ones(joins.sum()), (ends[joins], corners + key[joins])),
-        shape=(corners + keys,) * 2,
-    )
-    return np.asarray(connected_components(graph, directed=False)[1][:corners])
+    return connected(corners + keys, ends[joins], corners + key[joins])[:corners]

@@ -7,16 +7,12 @@ winding number what it should add: the solid gets holes and hollows that nobody 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from carillon.fem.geometry.facets import Facets, connected
 from carillon.fem.geometry.parts import parts_of, signed_volumes, winding_numbers
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 INSIDE = 0.5
 """Winding number of another part about a point from which on the point is in it."""
@@ -41,7 +37,8 @@ def turned_alike(vertices: Array, faces: Index, name: str) -> Index | None:
 
     Two triangles that alone share an edge pass it in opposite ways; parts that are inside out are
     turned as the others are, unless they are cavities of them. Of faces that are there both ways
-    one stays. Everything is as it was, None, if no face has to be turned.
+    one stays. Everything is as it was, None, if no face has to be turned. Raises UserError if all
+    faces of the surface, or of a closed part, are there both ways, or faces cannot be turned alike.
 
     Parameters
     ----------
@@ -49,12 +46,6 @@ def turned_alike(vertices: Array, faces: Index, name: str) -> Index | None:
         In any unit; those at one place are one.
     name
         Of the mesh, for messages.
-
-    Raises
-    ------
-    UserError
-        If all faces of the surface, or of a closed part, are there both ways, or faces cannot be
-        turned alike.
     """
     facets = Facets.of_surface(vertices, faces)
     if not len(facets):

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.geometry.facets import Facets, connected
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 EXACT = 20_000_000
 """Products of points and triangles up to which winding numbers are summed exactly."""

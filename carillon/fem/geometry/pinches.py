@@ -7,13 +7,10 @@ that both sides have a share in join them there.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.geometry.facets import Facets, connected
 from carillon.fem.geometry.parts import winding_numbers
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 COINCIDENT = 1e-6
 """Angle [rad] around an edge within which two triangles lie on each other."""
@@ -28,11 +25,8 @@ MOST_EDGES = 1000
 def pinches(facets: Facets) -> Array:
     """Ends (k, 2, 3) of edges along which a solid touches itself, the longest first.
 
-    Parameters
-    ----------
-    facets
-        The whole surface as one sheet, its faces turned alike. Triangles that are there both ways
-        are walls inside the solid and do not count.
+    `facets`: the whole surface as one sheet, its faces turned alike. Triangles that are there both
+    ways are walls inside the solid and do not count.
     """
     there = facets.of_face >= 0
     times = np.bincount(facets.of_face[there], facets.along[there], minlength=len(facets))

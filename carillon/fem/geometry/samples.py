@@ -7,18 +7,13 @@ and wherever the lines along the three axes do not agree.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Flags, Index, Surface
 from carillon.fem.geometry.crossings import line_crossings
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.winding import Winding
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
 
 NEAR = 1e-5
 """Distance [voxels] from a crossing up to which a point counts as on the surface."""
@@ -35,17 +30,17 @@ class SamplePoints:
         Odd, so that one is the voxel's centre.
     """
 
-    def __init__(self, surface: trimesh.Trimesh, grid: Grid, count: int) -> None:
+    def __init__(self, surface: Surface, grid: Grid, count: int) -> None:
         self._shape, self._count = grid.shape, count
         self._winding = Winding(surface, grid)
         self._lines = _lines(surface, grid, count)
 
-    def centres(self) -> NDArray[np.bool_]:
+    def centres(self) -> Flags:
         """Whether the centre of each voxel (nx, ny, nz) is inside."""
         index = np.indices(self._shape).reshape(3, -1).T
         return self.inside(self._count * index + self._count // 2).reshape(self._shape)
 
-    def inside(self, index: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def inside(self, index: Index) -> Flags:
         """Whether the points with indices (p, 3) among those of the whole grid are inside."""
         if self._lines is None:
             return self._winding.inside((index + 0.5) / self._count)
@@ -61,7 +56,7 @@ class SamplePoints:
         return inside
 
 
-def _lines(surface: trimesh.Trimesh, grid: Grid, count: int) -> list | None:
+def _lines(surface: Surface, grid: Grid, count: int) -> list | None:
     """Crossings of the lines through the points along each axis.
 
     None for triangles turned either way, whose crossings do not tell in from out, and for sieves.

@@ -12,17 +12,6 @@ SMALL = 3e-3
 """Longest side [m] up to which a mesh that is taken for one in millimetres may be in metres."""
 
 
-def size_in_words(extents: Sequence[float]) -> str:
-    """Sides of the bounding box [m].
-
-    Examples
-    --------
-    >>> size_in_words([0.4, 0.1, 0.05])
-    '0.4 x 0.1 x 0.05 m'
-    """
-    return f"{' x '.join(f'{side:.4g}' for side in extents)} m"
-
-
 def sizes_in_words(mesh: Sequence[float], voxels: Sequence[float] | None) -> str:
     """Sides of the boxes around a mesh and around the voxels that stand for it [m].
 
@@ -35,8 +24,12 @@ def sizes_in_words(mesh: Sequence[float], voxels: Sequence[float] | None) -> str
     >>> sizes_in_words([0.4, 0.1, 0.05], None)
     'mesh 0.4 x 0.1 x 0.05 m'
     """
-    beside = "" if voxels is None else f", voxels {size_in_words(voxels)}"
-    return f"mesh {size_in_words(mesh)}{beside}"
+    beside = "" if voxels is None else f", voxels {_in_words(voxels)}"
+    return f"mesh {_in_words(mesh)}{beside}"
+
+
+def _in_words(extents: Sequence[float]) -> str:
+    return f"{' x '.join(f'{side:.4g}' for side in extents)} m"
 
 
 def doubt_unit(mesh: str, extents: Sequence[float], unit: float) -> None:
@@ -51,10 +44,7 @@ def doubt_unit(mesh: str, extents: Sequence[float], unit: float) -> None:
 def unit_hint(extents: Sequence[float], unit: float) -> str | None:
     """What to say of sides [m] that a mistaken unit would make.
 
-    Parameters
-    ----------
-    unit
-        Metres per unit of the mesh, as it was given.
+    `unit`: metres per unit of the mesh, as it was given.
 
     Examples
     --------
@@ -63,7 +53,7 @@ def unit_hint(extents: Sequence[float], unit: float) -> str | None:
     >>> unit_hint([0.0004, 0.0001, 0.0001], 0.001)
     'it measures 0.0004 x 0.0001 x 0.0001 m; if its coordinates are metres, give --unit 1'
     """
-    longest, measures = max(extents), f"it measures {size_in_words(extents)}"
+    longest, measures = max(extents), f"it measures {_in_words(extents)}"
     if unit == 1.0 and longest >= LARGE:
         return f"{measures}; if its coordinates are millimetres, give --unit 0.001"
     if unit < 1.0 and longest <= SMALL and longest / unit < LARGE:

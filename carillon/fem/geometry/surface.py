@@ -18,10 +18,8 @@ from carillon.errors import UserError
 from carillon.fem.geometry.beside import Beside, NoFiles
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
-from carillon.fem.geometry.headers import require_plain_ply, whole_stl
-from carillon.fem.geometry.obj import plain_obj
-from carillon.fem.geometry.off import obj_of_off
 from carillon.fem.geometry.orientation import turned_alike
+from carillon.fem.geometry.plain_files import obj_of_off, plain_obj, require_plain_ply, whole_stl
 from carillon.files.paths import require_file
 from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
 
@@ -88,11 +86,8 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
 def surface_of_triangles(vertices: ArrayLike, faces: ArrayLike, name: str) -> trimesh.Trimesh:
     """A surface [m] of vertices (v, 3) and triangles (f, 3), checked as those of files are.
 
-    Raises
-    ------
-    UserError
-        If arrays have other shapes or faces name vertices that are not there, and for what
-        `load_surface` refuses of coordinates and faces.
+    Raises UserError if arrays have other shapes or faces name vertices that are not there, and for
+    what `load_surface` refuses of coordinates and faces.
     """
     surface = trimesh.Trimesh(np.asarray(vertices), np.asarray(faces), process=False)
     try:

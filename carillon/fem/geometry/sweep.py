@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -20,10 +21,10 @@ def joined(*parts: trimesh.Trimesh) -> trimesh.Trimesh:
     return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
 
 
-def turned(profile: list, ring: bool = False) -> trimesh.Trimesh:
-    """Turn a profile of (radius, z) about z; a `ring` closes on itself instead of on the axis."""
-    points = np.array([*profile, profile[0]] if ring else profile, dtype=float)
-    return outward(revolve(points, sections=SECTIONS))
+def turned(radius: Sequence[float], height: Sequence[float], ring: bool = False) -> trimesh.Trimesh:
+    """Turn a profile about z; a `ring` closes on itself instead of on the axis."""
+    points = np.column_stack([radius, height])
+    return outward(revolve(np.vstack([points, points[:1]]) if ring else points, sections=SECTIONS))
 
 
 def tube(

@@ -56,12 +56,8 @@ def is_simple(neighbourhood: int) -> bool:
 
     The solid is connected through faces and the void through corners: the centre is simple if it
     touches exactly one piece of the solid among its 18 neighbours, and exactly one piece of the
-    void among its 26 (Bertrand and Malandain 1994).
-
-    Parameters
-    ----------
-    neighbourhood : int
-        Bit ``9*x + 3*y + z`` tells whether position (x, y, z) in 0..2 is solid.
+    void among its 26 (Bertrand and Malandain 1994). `neighbourhood`: bit ``9*x + 3*y + z`` tells
+    whether position (x, y, z) in 0..2 is solid.
 
     Examples
     --------

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array, Flags, Index
 
 LONGEST = 0.5
 """Edges [voxels] to which triangles are cut so that no voxel is missed that matters."""
@@ -17,8 +16,8 @@ _ROOM = 256
 
 
 def touched_voxels(
-    vertices: Array, faces: NDArray[np.int64], origin: Array, edge: float, shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
+    vertices: Array, faces: Index, origin: Array, edge: float, shape: tuple[int, ...]
+) -> Flags:
     """Voxels (nx, ny, nz) that hold a vertex once all edges are cut in halves up to `LONGEST`.
 
     Parameters

@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import operator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from carillon.arrays import Surface
 from carillon.errors import UserError
 from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.fill import FILLS, cut_triangles
 from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.topology import pieces as label_pieces
 
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
 COMPONENTS = ("error", "largest")
 
-#: Most voxels of a bounding grid; filling takes about 150 bytes for each of them.
 MAX_GRID = 16_000_000
-
-#: Most triangles that a surface may be cut into; each takes about 100 bytes.
+"""Most voxels of a bounding grid; filling takes about 150 bytes for each of them."""
 MAX_TRIANGLES = 100_000_000
-
-#: Factors by which a resolution is raised in search of one that leaves the model in one piece,
-#: and the largest grid [voxels] that such a trial may have.
-TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0)
-TRIAL_GRID = 500_000
+"""Most triangles that a surface may be cut into; each takes about 100 bytes."""
+TRIAL_FACTORS, TRIAL_GRID = (1.25, 1.5, 2.0, 3.0), 500_000
+"""Factors by which a resolution is raised in search of one that leaves the model in one piece,
+and the largest grid [voxels] that such a trial may have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +72,16 @@ class VoxelModel:
 
 
 def voxelize(
-    surface: trimesh.Trimesh,
+    surface: Surface,
     resolution: int,
     fill: str = "winding",
     components: str = "error",
     name: str = "mesh",
 ) -> VoxelModel:
     """Fill the inside of a surface with cubes that hang together through their faces.
+
+    Raises UserError if the resolution is not an integer >= 2 or needs too large a grid, if no voxel
+    is filled, if the model falls into pieces, or its bodies touch along edges or in points alone.
 
     Parameters
     ----------
@@ -100,17 +97,6 @@ def voxelize(
         zero-frequency modes that the object does not have.
     name
         Name of the model.
-
-    Returns
-    -------
-    VoxelModel
-        The same for the same input.
-
-    Raises
-    ------
-    UserError
-        If the resolution is not an integer >= 2 or needs too large a grid, if no voxel is filled,
-        if the model falls into pieces, or its bodies touch along edges or in points alone.
 
     Examples
     --------
@@ -141,13 +127,10 @@ def voxelize(
     return replace(model, filled=labels == 1)
 
 
-def checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> int:
+def checked_resolution(surface: Surface, resolution: int, name: str) -> int:
     """The resolution as an int.
 
-    Raises
-    ------
-    UserError
-        If it is none of at least 2, or needs too large a grid or too many triangles.
+    Raises UserError if it is none of at least 2, or needs too large a grid or too many triangles.
     """
     try:
         checked = operator.index(resolution)
@@ -177,7 +160,7 @@ def checked_resolution(surface: trimesh.Trimesh, resolution: int, name: str) -> 
 
 
 def _filled_model(
-    surface: trimesh.Trimesh, grid: Grid, resolution: int, fill: str, name: str
+    surface: Surface, grid: Grid, resolution: int, fill: str, name: str
 ) -> VoxelModel:
     filled, origin = FILLS[fill](surface, grid)
     # Padding at the far end keeps index 0 the start of a block.
@@ -185,9 +168,7 @@ def _filled_model(
     return VoxelModel(even, origin, grid.edge, name, resolution)
 
 
-def _pieces_message(
-    surface: trimesh.Trimesh, model: VoxelModel, fill: str, sizes: np.ndarray
-) -> str:
+def _pieces_message(surface: Surface, model: VoxelModel, fill: str, sizes: np.ndarray) -> str:
     shown = [f"{size:,}" for size in sizes[:4]]
     if len(sizes) > 4:
         shown = [*shown[:3], f"{len(sizes) - 3:,} smaller ones"]
@@ -201,7 +182,7 @@ def _pieces_message(
     )
 
 
-def _connected_resolution(surface: trimesh.Trimesh, model: VoxelModel, fill: str) -> int | None:
+def _connected_resolution(surface: Surface, model: VoxelModel, fill: str) -> int | None:
     for factor in TRIAL_FACTORS:
         resolution = int(np.ceil(model.resolution * factor))
         if model.filled.size * factor**3 > TRIAL_GRID:

@@ -5,14 +5,10 @@ Jacobson et al. 2013; by the hierarchy of Barill et al. 2018.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from carillon.arrays import Surface
 from carillon.fem.geometry.grid import Grid
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
 
 #: Winding number from which a point is inside. Below the 1/2 of a point on the surface by more than
 #: the error of fast winding numbers (0.02), so that a wall through sample points is not ragged.
@@ -28,7 +24,7 @@ CHUNK = 2_000_000
 class Winding:
     """Winding numbers of a surface about points, in voxels from the corner of a grid."""
 
-    def __init__(self, surface: trimesh.Trimesh, grid: Grid) -> None:
+    def __init__(self, surface: Surface, grid: Grid) -> None:
         self._surface, self._grid = surface, grid
         self._triangles: tuple[np.ndarray, np.ndarray] | None = None
 
