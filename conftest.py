@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+import carillon
 from carillon.processes import mpi_environment
 from carillon.processes.threads import allowed_threads
 from studies.recordings.packages import SOUNDS
@@ -166,6 +167,11 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CARILLON_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def names_of_examples(doctest_namespace: dict[str, Any]) -> None:
+    doctest_namespace["ca"] = carillon
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ Beside these, the packages in here are the common ground of all rooms: commands 
 provenance, processes with their threads and ranks, and the finite element (`fem`).
 """
 
+# ruff: noqa: F403, F405
 import os as _os
 import sys as _sys
 from typing import TYPE_CHECKING
@@ -15,25 +16,7 @@ from carillon.processes import present_folder as _present_folder
 from carillon.processes import rooms as _rooms
 
 if TYPE_CHECKING:
-    from carillon.api import (
-        Design,
-        Forests,
-        Material,
-        Mesh,
-        Solution,
-        audit,
-        coarsen,
-        compare,
-        design,
-        extract,
-        generate,
-        load_mesh,
-        read,
-        render,
-        solve,
-        train,
-        write_wav,
-    )
+    from carillon.api import *
     from carillon.errors import ConvergenceError, UserError
 
 # Before anything loads numpy, and with it OpenBLAS, or numba, or MPI.

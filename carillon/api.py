@@ -4,7 +4,8 @@ Arrays are float64 and SI.  Everything runs in a plain script, and on the ranks 
 `mpiexec -n RANKS python -m mpi4py SCRIPT`, all of which then call `solve` together: frequencies and
 residuals are on every rank, meshes and shapes on rank 0, which writes the files.
 
-Rooms are loaded by the functions that need them, and nothing below imports this module.
+Rooms are loaded by the functions that need them, and nothing below imports this module. Examples
+suppose `import carillon as ca` and `import numpy as np`.
 """
 
 from __future__ import annotations
@@ -60,7 +61,6 @@ class Mesh:
 
     Examples
     --------
-    >>> import carillon as ca
     >>> bar = ca.load_mesh("builtin:bar")
     >>> bar.name, bar.hexahedra(12).n_cells
     ('bar', 18)
@@ -73,10 +73,7 @@ class Mesh:
     def of_triangles(cls, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Self:
         """The surface of vertices (v, 3) [m] and triangles (f, 3).
 
-        Raises
-        ------
-        UserError
-            If it is no surface around a solid.
+        Raises UserError if it is no surface around a solid.
         """
         return cls(surface_of_triangles(vertices, faces, name), name)
 
@@ -98,10 +95,7 @@ class Mesh:
     def hexahedra(self, resolution: int) -> HexMesh:
         """The voxels inside, `resolution` of them along the longest side.
 
-        Raises
-        ------
-        UserError
-            If they do not hold together.
+        Raises UserError if they do not hold together.
         """
         return hexmesh_from_voxels(voxelize(self.surface, resolution, name=self.name))
 
@@ -109,19 +103,15 @@ class Mesh:
 def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     """The surface in a mesh file (OBJ, STL, PLY, OFF, glTF), or `builtin:NAME`.
 
+    Raises UserError if there is no such mesh, or it is no surface around a solid.
+
     Parameters
     ----------
     unit
         Metres per unit of the file.
 
-    Raises
-    ------
-    UserError
-        If there is no such mesh, or it is no surface around a solid.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> ca.load_mesh("builtin:plate", unit=0.5).extents.round(3).tolist()
     [0.12, 0.12, 0.019]
     """
@@ -147,7 +137,6 @@ class Material:
 
     Examples
     --------
-    >>> import carillon as ca
     >>> stiffer_above = ca.Material(lambda centres: 1e9 * (1.0 + centres[:, 2]))
     >>> ca.Material.named("steel").density
     7850.0
@@ -163,10 +152,7 @@ class Material:
     def named(cls, name: str) -> Self:
         """A material such as `steel` or `glass`, with its constants and its damping.
 
-        Raises
-        ------
-        UserError
-            If there is none of that name.
+        Raises UserError if there is none of that name.
         """
         from sound.scenes.materials import named_material
 
@@ -229,10 +215,7 @@ class Solution:
     def plot(self, mode: int) -> Figure:
         """A figure of the solid in a mode, counted from 1, rigid ones included.
 
-        Raises
-        ------
-        UserError
-            If there is no such mode.
+        Raises UserError if there is no such mode.
         """
         from matplotlib.figure import Figure
 
@@ -251,10 +234,7 @@ class Solution:
     def save(self, path: str | Path) -> None:
         """Write a modes file, which all commands read.
 
-        Raises
-        ------
-        UserError
-            If it cannot be written.
+        Raises UserError if it cannot be written.
         """
         from solver.files.modes_file import write_modes
 
@@ -269,10 +249,7 @@ class Solution:
     def to_vtu(self, path: str | Path) -> None:
         """Write mesh, moduli and modes for ParaView; finite cells as cubes with eight nodes.
 
-        Raises
-        ------
-        UserError
-            If it cannot be written.
+        Raises UserError if it cannot be written.
         """
         import meshio
 
@@ -293,7 +270,6 @@ class Solution:
             grid.write(temporary, file_format="vtu")
 
     def _file(self) -> ModesFile:
-        """Content of its modes file."""
         from solver.files.modes_file import ModesFile
 
         if self.solid is None or self.shapes is None:
@@ -315,6 +291,9 @@ def solve(
     **options: Any,
 ) -> Solution:
     """Lowest modes of a solid; collective.
+
+    Raises UserError for anything wrong with the solid or the options, and ConvergenceError if a
+    tolerance was missed.
 
     Parameters
     ----------
@@ -338,16 +317,8 @@ def solve(
     options
         `tolerance`, `linear_solver` and the other options of `carillon modes`, with underscores.
 
-    Raises
-    ------
-    UserError
-        For anything wrong with the solid or the options.
-    ConvergenceError
-        If a tolerance was missed.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> solution = ca.solve("builtin:bar", ca.Material.named("aluminium"), resolution=12, modes=10)
     >>> solution.frequencies[6:].round(-1).tolist()
     [1790.0, 2020.0, 3330.0, 5250.0]
@@ -380,6 +351,8 @@ def coarsen(
 ) -> Solid:
     """A solid of up to eight times fewer elements, one for each 2x2x2 block of voxels.
 
+    Raises UserError for anything wrong with the solid, or forests for another Poisson's ratio.
+
     Parameters
     ----------
     body, material, resolution
@@ -389,14 +362,8 @@ def coarsen(
     forests
         For `ddfem`: those that come along unless given.
 
-    Raises
-    ------
-    UserError
-        For anything wrong with the solid, or forests for another Poisson's ratio.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> fine = ca.solve("builtin:bar", "two-region", resolution=16, modes=10)
     >>> coarse = ca.solve(ca.coarsen("builtin:bar", "two-region", resolution=16), modes=10)
     >>> coarse.mesh.n_cells, fine.mesh.n_cells
@@ -418,14 +385,10 @@ def coarsen(
 def read(path: str | Path) -> Solution | Design:
     """The modes in a modes file, or the design in a design file.
 
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged or of another kind.
+    Raises UserError if the file is missing, damaged or of another kind.
 
     Examples
     --------
-    >>> import carillon as ca
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     ca.solve("builtin:box", resolution=4, modes=8).save(f"{folder}/box.h5")
@@ -446,14 +409,10 @@ def read(path: str | Path) -> Solution | Design:
 def compare(solution: Solution, truth: Solution) -> SpectrumComparison:
     """How far a spectrum is from another that is taken for the truth, on any two meshes.
 
-    Raises
-    ------
-    UserError
-        If they are of other solids, or one has no elastic modes.
+    Raises UserError if they are of other solids, or one has no elastic modes.
 
     Examples
     --------
-    >>> import carillon as ca
     >>> fine, coarse = (ca.solve("builtin:box", resolution=n, modes=12) for n in (12, 6))
     >>> bool(0.0 < ca.compare(coarse, fine).frequency_rms_relative_error < 0.05)
     True
@@ -467,6 +426,7 @@ def audit(solution: Solution | str | Path, tolerance: float = 1e-7) -> Audit:
     """Check a spectrum by itself: residuals, orthogonality, and a count by inertia.
 
     K and M are assembled anew; `faults` of what is returned says what is wrong, a sentence each.
+    Raises UserError if the file is unusable.
 
     Parameters
     ----------
@@ -475,14 +435,8 @@ def audit(solution: Solution | str | Path, tolerance: float = 1e-7) -> Audit:
     tolerance
         Relative error that the eigenvalues were asked for to.
 
-    Raises
-    ------
-    UserError
-        If the file is unusable.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> found = ca.audit(ca.solve("builtin:box", resolution=8, modes=12))
     >>> found.faults, found.counted == found.expected
     ([], True)
@@ -509,6 +463,7 @@ def render(
     """Samples (s,) of the sound of one strike or of many.
 
     Those of a design are of full scale as its clips; those of a solution are scaled to 1 dB below.
+    Raises UserError if a point is far from the surface, a target unknown, or nothing sounds.
 
     Parameters
     ----------
@@ -531,14 +486,8 @@ def render(
     damping
         Of a solution: Rayleigh's coefficients of mass [1/s] and of stiffness [s].
 
-    Raises
-    ------
-    UserError
-        If a point is far from the surface, a target unknown, or nothing sounds.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> bar = ca.solve("builtin:bar", resolution=12, modes=12)
     >>> samples = ca.render(bar, bar.mesh.nodes[0], seconds=0.5)
     >>> samples.shape, float(abs(samples).max().round(2))
@@ -575,14 +524,10 @@ def render(
 def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> None:
     """Write samples (s,), full scale being 1, as a sound file.
 
-    Raises
-    ------
-    UserError
-        If it cannot be written, or its name does not end in .wav.
+    Raises UserError if it cannot be written, or its name does not end in .wav.
 
     Examples
     --------
-    >>> import carillon as ca
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     ca.write_wav(f"{folder}/tone.wav", np.sin(0.1 * np.arange(2000)))
@@ -597,6 +542,8 @@ def extract(
 ) -> ModalSound:
     """Frequencies, dampings and amplitudes of the modes that the recording of a strike holds.
 
+    Raises UserError if the clip is unusable or has no modes.
+
     Parameters
     ----------
     clip
@@ -604,14 +551,8 @@ def extract(
     modes
         Number of modes to keep, those with most energy; all that are found unless given.
 
-    Raises
-    ------
-    UserError
-        If the clip is unusable or has no modes.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> seconds = np.arange(8000) / 8000
     >>> clip = np.exp(-8.0 * seconds) * np.sin(2.0 * np.pi * 440.0 * seconds)
     >>> ca.extract(clip, 8000).frequencies.round(2).tolist()
@@ -659,15 +600,12 @@ class Design:
     def export(self, path: str | Path, points: int = 0) -> None:
         """Write it for other tools: .h5, .gltf, .glb, .dsp (Faust) or .npy (moduli).
 
+        Raises UserError if the ending tells no format, or the file cannot be written.
+
         Parameters
         ----------
         points
             Struck points of a Faust program, besides the targets'.
-
-        Raises
-        ------
-        UserError
-            If the ending tells no format, or the file cannot be written.
         """
         from sound.export.formats import export_design, format_of
 
@@ -676,10 +614,7 @@ class Design:
     def save(self, path: str | Path) -> None:
         """Write a design file, which all commands read.
 
-        Raises
-        ------
-        UserError
-            If it cannot be written.
+        Raises UserError if it cannot be written.
         """
         from sound.project.design_file import write_design
 
@@ -688,6 +623,8 @@ class Design:
 
 def design(project: str | Path | None = None, initial: Design | None = None, **keys: Any) -> Design:
     """Search for a material that lets struck points of a solid sound as clips do.
+
+    Raises UserError for anything wrong with the mesh, the points, the clips or the numbers.
 
     Parameters
     ----------
@@ -699,18 +636,12 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
         Keys of a project: `mesh`, `resolution`, `targets`, `optimiser` and so on, sections as
         dictionaries; paths are from the folder of the project, or the present one.
 
-    Raises
-    ------
-    UserError
-        For anything wrong with the mesh, the points, the clips or the numbers.
-
     Notes
     -----
     Processes share the work, so that a script begins by `if __name__ == "__main__":`.
 
     Examples
     --------
-    >>> import carillon as ca
     >>> try:
     ...     ca.design(mesh="builtin:bar", targets=[])
     ... except ca.UserError as error:
@@ -746,7 +677,6 @@ class Forests:
 
     Examples
     --------
-    >>> import carillon as ca
     >>> forests = ca.Forests.load()
     >>> soft, stiff = forests.coarsen([[1, 1, 1, 1, 2, 2, 2, 2], [3, 3, 3, 3, 6, 6, 6, 6]])
     >>> bool(np.allclose(stiff, 3.0 * soft))
@@ -760,10 +690,7 @@ class Forests:
     def load(cls, path: str | Path | None = None) -> Self:
         """The forests of a file, or those that come along.
 
-        Raises
-        ------
-        UserError
-            If they are missing or damaged.
+        Raises UserError if they are missing or damaged.
         """
         from forests.default import default_path
         from forests.model import load_model
@@ -779,10 +706,7 @@ class Forests:
     def coarsen(self, young: ArrayLike) -> Array:
         """Moduli (b, 8) at the quadrature points of elements from those (b, 8) of blocks' voxels.
 
-        Raises
-        ------
-        UserError
-            For a bad shape, or a modulus that is negative or not finite.
+        Raises UserError for a bad shape, or a modulus that is negative or not finite.
         """
         from forests.evaluate import coarsen
 
@@ -792,19 +716,15 @@ class Forests:
 def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -> None:
     """Draw random blocks, fit a coarse element to each, and write them to a shard for `train`.
 
+    Raises UserError for impossible options, or if the file cannot be written.
+
     Parameters
     ----------
     options
         `seed`, `objective` and the other options of `carillon generate`, with underscores.
 
-    Raises
-    ------
-    UserError
-        For impossible options, or if the file cannot be written.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> try:
     ...     ca.generate("shard.h5", samples=0)
     ... except ca.UserError as error:
@@ -827,19 +747,15 @@ def train(
 ) -> Forests:
     """Train forests on shards of `generate` and write them to a file.
 
+    Raises UserError for impossible options, unusable shards or too few samples.
+
     Parameters
     ----------
     options
         `trees`, `depth` and the other options of `carillon train`, with underscores.
 
-    Raises
-    ------
-    UserError
-        For impossible options, unusable shards or too few samples.
-
     Examples
     --------
-    >>> import carillon as ca
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     ca.generate(f"{folder}/shard.h5", samples=200)
@@ -865,7 +781,6 @@ def _shapes(modes: Array | None) -> Array | None:
 
 
 def _solid(body: Body, given: Given, resolution: int, discretisation: str) -> Solid:
-    """The solid with material, in the discretisation that is asked for."""
     made = given if isinstance(given, Material) else Material(1e9 if given is None else given)
     require_constants(made.poisson, made.density)
     if isinstance(body, Solid):

@@ -84,7 +84,4 @@ def test_touched_voxels_hold_the_vertices_of_the_surface_cut_small(name):
     expected = np.zeros(grid.shape, dtype=bool)
     index = np.floor((vertices - grid.origin) / grid.edge).astype(int)
     expected[tuple(np.clip(index, 0, np.array(grid.shape) - 1).T)] = True
-    found = touched_voxels(
-        np.asarray(surface.vertices), np.asarray(surface.faces), grid.origin, grid.edge, grid.shape
-    )
-    assert np.array_equal(found, expected)
+    assert np.array_equal(touched_voxels(surface, grid), expected)

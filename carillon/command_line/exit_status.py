@@ -147,7 +147,6 @@ def _drop_unwritten() -> None:
 
 
 def _drop_output() -> None:
-    """Let whatever is still printed go nowhere."""
     with suppress(OSError, ValueError):  # no file, as in tests
         number = sys.stdout.fileno()
         nowhere = os.open(os.devnull, os.O_WRONLY)

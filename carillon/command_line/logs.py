@@ -14,8 +14,6 @@ from carillon.command_line.progress import say
 
 
 class _LineHandler(logging.Handler):
-    """Messages as lines among those of the progress."""
-
     def emit(self, record: logging.LogRecord) -> None:
         """Show a message."""
         say(self.format(record))

@@ -61,7 +61,6 @@ def sync_folder(folder: Path) -> None:
 
 
 def _clear(target: Path) -> None:
-    """Remove what killed writers of `target` have left."""
     folder = os.open(target.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         remove_leftovers(folder, target.name)

@@ -92,7 +92,6 @@ def _entries(root: h5py.Group) -> Iterator[tuple[h5py.Group, str, Any]]:
 
 
 def _require_numbers_here(group: h5py.Group, name: str, dataset: h5py.Dataset, size: int) -> None:
-    """Refuse a dataset that is not all in the file as it is read."""
     if dataset.is_virtual or dataset.external:
         raise refused(group, f"dataset {name!r} takes its numbers from another file")
     made = dataset.id.get_create_plist()

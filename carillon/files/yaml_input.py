@@ -122,7 +122,6 @@ def nearest(node: yaml.Node, place: Iterable[str | int]) -> tuple[int, int]:
 
 
 def _entries(node: yaml.Node) -> dict[str | int, tuple[int, yaml.Node]]:
-    """Line and node of each value in a node."""
     if isinstance(node, yaml.MappingNode):
         return {key.value: (key.start_mark.line, value) for key, value in node.value}
     if isinstance(node, yaml.SequenceNode):

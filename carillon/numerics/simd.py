@@ -125,7 +125,6 @@ def _call(builder: Any, name: str, *arguments: Any) -> Any:
 
 
 def _at(builder: Any, start: Any, *steps: tuple[Any, int]) -> Any:
-    """`start` plus multiples of strides."""
     for stride, count in steps:
         start = builder.add(start, builder.mul(stride, _INDEX(count)))
     return start

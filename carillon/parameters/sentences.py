@@ -132,7 +132,6 @@ def no_key(name: str, known: list[str]) -> str:
 
 
 def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
-    """Words for the values that the broken rule admits."""
     if kind in _RULES:
         bound = _RULES[kind].format(
             **{key: _limit(value) for key, value in context.items() if key in _LIMITS}

@@ -113,7 +113,6 @@ def _kept_nowhere(function: Any, source: str) -> Any:
 
 
 def _numba() -> tuple[Any, Any]:
-    """Numba's modules of the cache and of its settings."""
     from numba.core import caching, config
 
     return caching, config
@@ -150,6 +149,5 @@ def _can_be_made(folder: str) -> bool:
 
 
 def _say(sentence: str) -> None:
-    """Log a sentence, once on all ranks."""
     if all(os.environ.get(name, "0") == "0" for name in _RANKS):
         logger.warning(sentence)

@@ -35,12 +35,7 @@ _SEVERAL = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK", *_MPIEXEC),
     ("PMI_SIZE", "PMI_RANK", *_MPIEXEC),
     ("MPI_LOCALNRANKS", "MPI_LOCALRANKID", *_MPIEXEC),
-    (
-        "SLURM_STEP_NUM_TASKS",
-        "SLURM_PROCID",
-        "task {} of {} of a Slurm step",
-        "srun --mpi=pmix",
-    ),
+    ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID", "task {} of {} of a Slurm step", "srun --mpi=pmix"),
 )
 """Variables by which launchers tell how many processes they have started, and which one this is."""
 _TRANSPORT, _WAYS = "OMPI_MCA_pml", "OMPI_MCA_btl"
@@ -87,15 +82,13 @@ def without_networks(environment: MutableMapping[str, str]) -> Iterator[None]:
     ...     environment["OMPI_MCA_btl"]
     'self,vader'
     """
-    if not _launched(environment):
-        chosen = {_TRANSPORT: "ob1", _WAYS: "self"}
-    elif _on_one_machine(environment):
-        chosen = {_TRANSPORT: "ob1", _WAYS: "self,vader"}
-    else:
-        chosen = {}
+    chosen = {}
+    launched = _launched(environment)
     # Other transports than this one do not take these ways.
-    if environment.get(_TRANSPORT, "ob1") != "ob1":
-        chosen = {}
+    if environment.get(_TRANSPORT, "ob1") == "ob1" and (
+        not launched or _on_one_machine(environment)
+    ):
+        chosen = {_TRANSPORT: "ob1", _WAYS: "self,vader" if launched else "self"}
     own = {name: value for name, value in chosen.items() if name not in environment}
     environment.update(own)
     try:
@@ -126,7 +119,6 @@ def keep_apart(environment: MutableMapping[str, str], process: int) -> None:
 
 
 def _name(process: int) -> str:
-    """What names of a process's directories begin with."""
     return f"{_OWN}.{os.uname().nodename}.{os.getuid()}.{process}."
 
 
@@ -192,12 +184,6 @@ def lonely_among(environment: Mapping[str, str]) -> str | None:
     """What to tell a process that has found no other ranks, if it was started as one of several.
 
     Without MPI, each of them would do all the work and write the same file.
-
-    Examples
-    --------
-    >>> lonely_among({"SLURM_STEP_NUM_TASKS": "2", "SLURM_PROCID": "0"})[:50]
-    'this process is task 0 of 2 of a Slurm step, but M'
-    >>> lonely_among({"SLURM_STEP_NUM_TASKS": "1"})
     """
     for size, rank, of, remedy in _SEVERAL:
         count = environment.get(size, "")

@@ -101,7 +101,6 @@ def record(parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def _command() -> str:
-    """The command line as one would type it."""
     program = Path(sys.argv[0])
     name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
     return shlex.join([*name.split(), *sys.argv[1:]])

@@ -22,7 +22,6 @@ def of_room(room: str) -> str:
 
 
 def _listed(room: str) -> Iterator[tuple[str, str | None, Command]]:
-    """Commands of a room: name, name in the room, and what it is."""
     if room == "studies":
         yield from (
             (f"{STUDY} {name}", each.in_room or name, each) for name, each in studies().items()

@@ -41,7 +41,6 @@ def _named(each: Parameter) -> str:
 
 
 def _meaning(each: Parameter) -> str:
-    """What a key means, without its unit."""
     text = each.meaning or (inspect.getdoc(each.domain.kind) or "").split("\n\n")[0]
     text = " ".join(text.split()).rstrip(".")
     unit = f" [{each.domain.unit or 1}]"
@@ -59,7 +58,6 @@ def _entries(known: Any, prefix: str) -> Iterator[str]:
 
 
 def _type(domain: ValueDomain) -> str:
-    """Type, choices and bounds in words."""
     null = ["null"] if domain.nullable else []
     if domain.choices:
         return " or ".join(["one of " + ", ".join(f"`{each}`" for each in domain.choices), *null])
@@ -86,7 +84,6 @@ def _number(value: float) -> str:
 
 
 def _default(each: Parameter) -> str:
-    """Default of a key; that of a section is its keys' own."""
     if each.default is REQUIRED:
         return "required"
     if is_dataclass(each.default):
@@ -95,6 +92,5 @@ def _default(each: Parameter) -> str:
 
 
 def _plain(value: Any) -> dict[str, Any]:
-    """Keys of a dataclass that are not their defaults."""
     own = {name: each.default for name, each in parameters_of(type(value)).items()}
     return {name: given for name, given in asdict(value).items() if given != own[name]}

@@ -86,7 +86,6 @@ def _rows(needs: Needs) -> list[list[str]]:
 
 
 def _reduced(needs: Needs) -> Needs:
-    """The arrows that do not follow from others."""
     reach: Needs = {}
     for name in TopologicalSorter(needs).static_order():
         reach[name] = needs[name].union(*(reach[other] for other in needs[name]))
@@ -97,7 +96,6 @@ def _reduced(needs: Needs) -> Needs:
 
 
 def _lines(names: list[str]) -> list[str]:
-    """Names as lines of text that fit into a box."""
     lines: list[str] = []
     for name in names:
         if lines and len(lines[-1]) + len(name) < 48:

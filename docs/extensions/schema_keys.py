@@ -15,7 +15,6 @@ def of_configuration() -> str:
 
 
 def _limits_of_rules() -> str:
-    """The rules' own limits as a table."""
     rows = [
         f"| `{rule}` | {each.what} | {each.memory_mb or ''} | {each.minutes} |"
         for rule, each in limits().items()

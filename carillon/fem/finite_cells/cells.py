@@ -80,7 +80,6 @@ class FiniteCells:
         return kinds_of_cells(octants, (places != own).any(axis=2))
 
     def _places(self) -> np.ndarray:
-        """Places (c, 27, 3) of the nodes from the lowest corner of each cell."""
         return np.asarray(self.mesh.node_grid[self.nodes] - self.grid[:, None])
 
     @property
@@ -130,7 +129,6 @@ class FiniteCells:
         )
 
     def _voxels(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (c, 8, 8) and lattice coordinates (c, 8, 3) of the octants' voxels."""
         return _voxels_of(self.nodes, self.grid, self.span, self.is_mixed)
 
     def hexmesh(self) -> HexMesh:

@@ -76,10 +76,10 @@ class LatticeCover:
         low = np.minimum(self.places.min(axis=0), places.min(axis=0, initial=0))
         shape = np.maximum(self.places.max(axis=0), places.max(axis=0, initial=0)) - low + 1
         keys = np.ravel_multi_index(tuple((self.places - low).T), tuple(shape))
-        wanted = np.ravel_multi_index(tuple((places - low).T), tuple(shape))
+        asked = np.ravel_multi_index(tuple((places - low).T), tuple(shape))
         order = np.argsort(keys)
-        at = order[np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)]
-        return np.where(keys[at] == wanted, at, -1)
+        at = order[np.minimum(np.searchsorted(keys[order], asked), len(keys) - 1)]
+        return np.where(keys[at] == asked, at, -1)
 
     def numbered(self, cells: Index, labels: Index) -> Index:
         """Parts (n,) with these labels, from 1, in cells (n,); -1 for those that hold nothing."""
@@ -155,9 +155,9 @@ def divided_cover(surface: Surface, grid: Grid, places: Index) -> LatticeCover:
     )
     divided = np.zeros(tuple(shape // 4), dtype=bool)
     divided[tuple(((places - low) // 2).T)] = True
-    wanted = divided.repeat(4, axis=0).repeat(4, axis=1).repeat(4, axis=2)
-    found = cover_of(find_inside(surface, box, wanted))
-    return replace(found, places=found.places + 2 * low)
+    requested = divided.repeat(4, axis=0).repeat(4, axis=1).repeat(4, axis=2)
+    cover = cover_of(find_inside(surface, box, requested))
+    return replace(cover, places=cover.places + 2 * low)
 
 
 def faces_of_halves(whole: LatticeCover, half: LatticeCover, undivided: Flags) -> Index:

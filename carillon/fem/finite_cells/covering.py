@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index, Surface
 from carillon.errors import UserError
@@ -159,15 +158,9 @@ class CellParts:
 
     def chosen(self, kept: Flags) -> CellParts:
         """Those that are kept (p,)."""
-        return replace(
-            self,
-            corner=self.corner[kept],
-            span=self.span[kept],
-            row=self.row[kept],
-            volumes=self.volumes[kept],
-            slight=self.slight[kept],
-            faces=self.faces.chosen(kept),
-        )
+        names = ("corner", "span", "row", "volumes", "slight")
+        arrays = {name: getattr(self, name)[kept] for name in names}
+        return replace(self, **arrays, faces=self.faces.chosen(kept))
 
     def cells(self, grid: Grid, step: float) -> FiniteCells:
         """The mesh of those that are not slight, by steps [m] from the corner of a lattice."""
@@ -179,7 +172,7 @@ class CellParts:
         return assemble_cells(nodes, places, row[1:], weights[rows], grid.origin, step, is_mixed)
 
 
-def pieces(cover: LatticeCover) -> tuple[NDArray[np.int32], Array]:
+def pieces(cover: LatticeCover) -> tuple[Index, Array]:
     """Number (p,) of the piece of the solid that each part is of, and volumes [voxels]."""
     piece = CellParts.of_cover(cover).faces.pieces(len(cover))
     volumes = np.where(cover.slight, 0.0, cover.volumes)

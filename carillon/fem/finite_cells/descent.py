@@ -32,7 +32,6 @@ def parents(whole: LatticeCover, half: LatticeCover, kept: Flags) -> Index:
 
 
 def _labels(cover: LatticeCover) -> Index:
-    """Label (p,) of each part in its cell, from 1."""
     number = np.flatnonzero(cover.number >= 0)
     return number - cover.first[cover.owner] + 1
 

@@ -63,10 +63,10 @@ class Inside:
         return float(halves[0]), float(halves[1])
 
 
-def find_inside(surface: Surface, grid: Grid, wanted: Flags | None = None) -> Inside:
+def find_inside(surface: Surface, grid: Grid, requested: Flags | None = None) -> Inside:
     """The inside of a surface, which may have holes and overlapping shells.
 
-    The lattice holds all of the surface, unless it is told which voxels are `wanted` (nx, ny, nz).
+    The lattice holds all of the surface, unless voxels (nx, ny, nz) are requested.
     """
     import trimesh
 
@@ -74,21 +74,23 @@ def find_inside(surface: Surface, grid: Grid, wanted: Flags | None = None) -> In
     merged.merge_vertices()
     vertices = np.ascontiguousarray((merged.vertices - grid.origin) / grid.edge)
     faces = np.ascontiguousarray(merged.faces, dtype=np.int64)
-    x, y, z = (spread_lines(vertices, faces, grid.shape[axis], axis) for axis in range(3))
-    crossed = [crossings(vertices, faces, (x, y, z), axis) for axis in range(3)]
+    spreads = [spread_lines(vertices, faces, grid.shape[axis], axis) for axis in range(3)]
+    crossed = [crossings(vertices, faces, spreads, axis) for axis in range(3)]
     counts = np.stack([crossings_of_voxels(each, grid.shape) for each in crossed], axis=3)
     state = np.where(counts.any(axis=3), CUT, EMPTY).astype(np.int8)
     facing = counts.argmax(axis=3).astype(np.int8)
-    if wanted is not None:
-        state[~wanted] = SKIPPED
+    if requested is not None:
+        state[~requested] = SKIPPED
     wind = Winding(surface, grid)
     sheet = False
     if merged.is_watertight and merged.is_winding_consistent:
         pieces = [_of_closed_surface(each, wind) for each in crossed]
-        state[(state == EMPTY) & _middles(pieces[0], grid.shape)] = FULL
+        x = pieces[0]
+        middles = _middles_inside(x.start, x.low, x.high, x.columns, LINES, grid.shape)
+        state[(state == EMPTY) & middles] = FULL
     else:
         levels = classify(state, wind)
-        ends = wanted is None
+        ends = requested is None
         pieces = [pieces_of_open_surface(each, state, levels, wind, ends) for each in crossed]
         there = [each for each in pieces if len(each.low)]
         sheet = bool(there) and not any(encloses(each, wind) for each in there)
@@ -96,9 +98,13 @@ def find_inside(surface: Surface, grid: Grid, wanted: Flags | None = None) -> In
 
 
 def _of_closed_surface(lines: Crossings, wind: Winding) -> Pieces:
-    low, high, line, certain = _between_crossings(lines.start, lines.place, lines.step)
-    unsure = np.flatnonzero(certain < 0)
-    inside = certain > 0
+    line = np.repeat(np.arange(len(lines.start) - 1), np.diff(lines.start))
+    passed = np.append(0, np.cumsum(lines.step, dtype=np.int64))
+    before, after = passed[lines.start[:-1]], passed[lines.start[1:]]
+    piece = np.flatnonzero(line[1:] == line[:-1])
+    low, high, line = lines.place[piece], lines.place[piece + 1], line[piece]
+    inside = passed[piece + 1] != before[line]
+    unsure = np.flatnonzero((after != before)[line])
     if len(unsure):
         # Lines that rounding let slip through an edge.
         inside[unsure] = wind.inside(points_on(lines, line[unsure], 0.5 * (low + high)[unsure]))
@@ -106,37 +112,8 @@ def _of_closed_surface(lines: Crossings, wind: Winding) -> Pieces:
 
 
 @numba.njit(cache=True, nogil=True)
-def _between_crossings(start, place, step):  # type: ignore[no-untyped-def]
-    """Pieces between crossings: ends, line, and whether inside; -1 where crossings do not tell."""
-    count = 0
-    for line in range(len(start) - 1):
-        count += max(start[line + 1] - start[line] - 1, 0)
-    low, high = np.empty(count), np.empty(count)
-    owner, certain = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int8)
-    count = 0
-    for line in range(len(start) - 1):
-        total = 0
-        for number in range(start[line], start[line + 1]):
-            total += step[number]
-        winding = 0
-        for number in range(start[line], start[line + 1] - 1):
-            winding += step[number]
-            low[count], high[count] = place[number], place[number + 1]
-            owner[count] = line
-            certain[count] = -1 if total != 0 else (1 if winding != 0 else 0)
-            count += 1
-    return low, high, owner, certain
-
-
-def _middles(pieces: Pieces, shape: tuple[int, int, int]) -> Flags:
-    """Voxels (nx, ny, nz) whose middle is inside, as their first line along x sees it."""
-    return np.asarray(
-        _middles_inside(pieces.start, pieces.low, pieces.high, pieces.columns, LINES, shape)
-    )
-
-
-@numba.njit(cache=True, nogil=True)
 def _middles_inside(start, low, high, columns, n, shape):  # type: ignore[no-untyped-def]
+    """Voxels whose middle is inside, as their first line along x sees it."""
     result = np.zeros(shape, dtype=np.bool_)
     for y in range(shape[1]):
         for z in range(shape[2]):

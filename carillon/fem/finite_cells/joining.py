@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from carillon.arrays import Flags, Index
 from carillon.fem.block import NODES
+from carillon.fem.geometry.facets import connected
 
 _COUNT = len(NODES)
 _STRIDE = np.array([1, 3, 9])
@@ -41,10 +40,10 @@ class Faces:
             faces.append(np.column_stack([number[stays[:, :2]], stays[:, 2:]]))
         return Faces(*faces)
 
-    def pieces(self, count: int) -> NDArray[np.int32]:
+    def pieces(self, count: int) -> Index:
         """Piece (count,) of the solid that each cell is of."""
         pairs = np.concatenate([self.alike[:, :2], self.unlike[:, :2]])
-        return _components(count, pairs[:, 0], pairs[:, 1])
+        return connected(count, pairs[:, 0], pairs[:, 1])
 
 
 def joined_nodes(corner: Index, span: Index, faces: Faces, slight: Flags) -> tuple[Index, Index]:
@@ -61,12 +60,12 @@ def joined_nodes(corner: Index, span: Index, faces: Faces, slight: Flags) -> tup
     hangs_from_cell = ~slight[beyond // _COUNT]
     hanging, beyond = hanging[hangs_from_cell], beyond[hangs_from_cell]
     joins.append(same)
-    label = _components(count, *np.concatenate(joins, axis=1))
+    label = connected(count, *np.concatenate(joins, axis=1))
     # A node that hangs between two cells hangs from nodes that they share.
     order = np.argsort(label[hanging], kind="stable")
     follows = np.flatnonzero(np.diff(label[hanging][order]) == 0)
     joins.append(np.stack([beyond[order][follows], beyond[order][follows + 1]]))
-    label = _components(count, *np.concatenate(joins, axis=1))
+    label = connected(count, *np.concatenate(joins, axis=1))
     replaced = np.arange(count)
     replaced[label[hanging]] = label[beyond]
     hangs = np.zeros(count, dtype=bool)
@@ -119,8 +118,3 @@ def _of_unlike(own: Index, corner: Index, span: Index, faces: Index) -> tuple[In
             beyond.append(target[hangs])
             same.append(np.stack([ends[~hangs], target[~hangs]]))
     return np.concatenate(hanging), np.concatenate(beyond), np.concatenate(same, axis=1)
-
-
-def _components(count: int, left: Index, right: Index) -> NDArray[np.int32]:
-    graph = sp.coo_matrix((np.ones(len(left)), (left, right)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])

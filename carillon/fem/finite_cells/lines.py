@@ -8,6 +8,7 @@ edges that the points are spread on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -74,15 +75,11 @@ def spread_lines(vertices: Array, faces: Index, count: int, axis: int) -> Spread
 def _split(heights: Array, area: Array) -> list[float]:
     """Ends of the pieces of an edge from 0 to 1 that is split at the heights of most area."""
     ends = [0.0, 1.0]
-    for height in np.unique(heights)[np.argsort(-_sums(heights, area), kind="stable")]:
+    distinct, which = np.unique(heights, return_inverse=True)
+    for height in distinct[np.argsort(-np.bincount(which, area), kind="stable")]:
         if len(ends) < MOST_PLANES + 2 and min(abs(height - end) for end in ends) > BESIDE:
             ends.append(float(height))
     return sorted(ends)
-
-
-def _sums(heights: Array, area: Array) -> Array:
-    """Area at each of the distinct heights, ascending."""
-    return np.asarray(np.bincount(np.unique(heights, return_inverse=True)[1], area), dtype=float)
 
 
 @cache
@@ -142,9 +139,7 @@ class Crossings(Lines):
     step: NDArray[np.int8]
 
 
-def crossings(
-    vertices: Array, faces: Index, spreads: tuple[Spread, Spread, Spread], axis: int
-) -> Crossings:
+def crossings(vertices: Array, faces: Index, spreads: Sequence[Spread], axis: int) -> Crossings:
     """Crossings of the lines along an axis through a lattice of voxels.
 
     Parameters

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
+from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import LINES
 from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
 
@@ -49,8 +50,10 @@ def find_parts(
         _take_along(
             cells, state, each.axis, each.start, each.low, each.high, each.columns, bounds, labels
         )
+    for octant, corner in enumerate(LINES * CORNERS):
+        x, y, z = (slice(start, start + LINES) for start in corner)
+        labels[state[:, octant] == FULL, x, y, z] = -1
     counts = np.zeros(len(cells), dtype=np.int64)
-    _take_full(state, labels)
     _number(labels, counts)
     return labels, counts
 
@@ -128,16 +131,6 @@ def _take_along(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _take_full(state, labels):  # type: ignore[no-untyped-def]
-    n = labels.shape[1] // 2
-    for k in range(len(state)):
-        for octant in range(8):
-            if state[k, octant] == FULL:
-                x, y, z = (octant & 1) * n, (octant >> 1 & 1) * n, (octant >> 2) * n
-                labels[k, x : x + n, y : y + n, z : z + n] = -1
-
-
-@numba.njit(cache=True, nogil=True)
 def _number(labels, counts):  # type: ignore[no-untyped-def]
     """Number what hangs together among the boxes that are -1."""
     size = labels.shape[1]
@@ -200,7 +193,6 @@ def _meetings_of_halves(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _meet(pair, below, above, found):  # type: ignore[no-untyped-def]
-    """Note which parts on the two sides of a face meet there."""
     size = len(below)
     begin = len(found)
     for i in range(size):

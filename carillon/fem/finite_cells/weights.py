@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
+from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import LINES, Spread
 from carillon.fem.finite_cells.parts import Labels, box_bounds
 from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
@@ -65,8 +66,7 @@ def weights_of_parts(
             lines,
         )
     cell, octant = np.nonzero(state == FULL)
-    corner = LINES * np.stack([octant & 1, octant >> 1 & 1, octant >> 2], axis=1)
-    part = labels[cell, corner[:, 0], corner[:, 1], corner[:, 2]].astype(np.int64)
+    part = labels[cell, *(LINES * CORNERS[octant]).T].astype(np.int64)
     weights[first[cell] + part - 1, octant] = octant_weights()[octant]
     np.add.at(lines, first[cell] + part - 1, LINES**2)
     return weights, lines

@@ -22,27 +22,6 @@ if TYPE_CHECKING:
     from carillon.fem.geometry.builtin import BUILTINS, builtin_surface
     from carillon.fem.geometry.surface import load_surface, surface_name
 
-__all__ = [
-    "BUILTINS",
-    "BUILTIN_NAMES",
-    "BUILTIN_PREFIX",
-    "CORNER_OFFSETS",
-    "FILLS",
-    "COMPONENTS",
-    "Blocks",
-    "HexMesh",
-    "VoxelModel",
-    "blocks_from_mesh",
-    "blocks_with_coarse",
-    "builtin_surface",
-    "hexmesh_from_grid",
-    "hexmesh_from_voxels",
-    "load_surface",
-    "prolongation",
-    "surface_name",
-    "voxelize",
-]
-
 # They need trimesh.
 __getattr__ = lazy_exports.exports(
     __name__,

@@ -66,16 +66,15 @@ def bridge(surface: Surface, voxels: VoxelModel) -> Array | None:
 def _inside(surface: Surface, voxels: VoxelModel) -> Flags:
     """Whether the sample points of filled voxels, along each axis, are inside the surface."""
     grid = Grid(voxels.origin, voxels.edge, voxels.shape)
-    corners, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
-    touched = touched_voxels(corners, faces, grid.origin, grid.edge, grid.shape)
+    touched = touched_voxels(surface, grid)
     inside = voxels.filled
     for axis in range(3):
         inside = np.repeat(inside, SAMPLES, axis=axis)
     # A filled voxel that the surface does not touch is full.
     near = np.argwhere(touched & voxels.filled)
-    offsets = np.indices((SAMPLES, SAMPLES, SAMPLES)).reshape(3, -1).T
-    index = (SAMPLES * near[:, None, :] + offsets).reshape(-1, 3)
-    inside[tuple(index.T)] = SamplePoints(surface, grid, SAMPLES).inside(index)
+    samples = SamplePoints(surface, grid, SAMPLES)
+    index = samples.of_voxels(near)
+    inside[tuple(index.T)] = samples.inside(index)
     return inside
 
 

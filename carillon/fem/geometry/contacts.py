@@ -56,7 +56,6 @@ def one_body(surface: Surface, components: str, name: str) -> Surface:
 
 
 def _say_pinched(surface: Surface, facets: Facets, name: str) -> None:
-    """Warn of edges along which a surface touches itself."""
     edges = pinches(facets) if len(facets) else np.empty((0, 2, 3))
     if not len(edges):
         return
@@ -157,7 +156,6 @@ def _meet_on_lines(
 def _holds_corners(
     facets: Facets, one: ClosedPart, other: ClosedPart, low: Array, high: Array
 ) -> bool:
-    """Whether corners of one part are inside the other."""
     corners = facets.vertices[np.unique(facets.triangles[one.triangles])]
     corners = corners[((corners >= low) & (corners <= high)).all(axis=1)]
     corners = corners[:: -(-len(corners) // SAMPLE) or 1]
@@ -168,7 +166,6 @@ def _holds_corners(
 
 
 def _touch(facets: Facets, one: ClosedPart, other: ClosedPart) -> bool:
-    """Whether a corner of one part lies on the other."""
     low, high = _common_box(one, other)
     if (high - low < -TOUCHING).any():
         return False
@@ -181,7 +178,6 @@ def _touch(facets: Facets, one: ClosedPart, other: ClosedPart) -> bool:
 
 
 def _distances(facets: Facets, part: ClosedPart, points: Array) -> Array:
-    """Distances (k,) of points (k, 3) from the surface of a part."""
     import igl
 
     if not len(points):

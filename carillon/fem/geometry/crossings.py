@@ -87,7 +87,6 @@ def _cross(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _height(p, q, r, x, y):  # type: ignore[no-untyped-def]
-    """Height of a triangle over (x, y)."""
     low, high = min(p[2], q[2], r[2]), max(p[2], q[2], r[2])
     a0, a1, b0, b1 = q[0] - p[0], q[1] - p[1], r[0] - p[0], r[1] - p[1]
     area = a0 * b1 - a1 * b0

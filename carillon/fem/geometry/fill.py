@@ -20,12 +20,11 @@ from carillon.fem.geometry.samples import SamplePoints
 from carillon.fem.geometry.topology import pieces, thin_to
 from carillon.fem.geometry.touching import touched_voxels
 
-#: Sample points per voxel edge for the filled fraction of a voxel. Odd, so that "half full" puts a
-#: wall at the middle of a voxel; an even number would move every wall outwards.
 SAMPLES = 3
-
-#: Factor between the volumes of the voxels and of the solid beyond which they are not alike.
+"""Sample points per voxel edge for the filled fraction of a voxel. Odd, so that "half full" puts a
+wall at the middle of a voxel; an even number would move every wall outwards."""
 TOO_THIN = 2.0
+"""Factor between the volumes of the voxels and of the solid beyond which they are not alike."""
 
 
 def winding_fill(surface: Surface, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -47,8 +46,7 @@ def winding_fill(surface: Surface, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     origin : (3,)
         Corner of the grid [m].
     """
-    corners, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
-    touched = touched_voxels(corners, faces, grid.origin, grid.edge, grid.shape)
+    touched = touched_voxels(surface, grid)
     fraction = filled_fraction(SamplePoints(surface, grid, SAMPLES), touched)
     half_full = fraction >= 0.5
     labels, _ = pieces(touched | half_full)
@@ -97,9 +95,8 @@ def filled_fraction(samples: SamplePoints, touched: np.ndarray) -> np.ndarray:
     fraction = samples.centres().astype(float)
     # A voxel that the surface does not touch is full or empty, and its centre says which.
     near = np.argwhere(touched)
-    offsets = np.indices((SAMPLES, SAMPLES, SAMPLES)).reshape(3, -1).T
-    index = (SAMPLES * near[:, None, :] + offsets).reshape(-1, 3)
-    fraction[tuple(near.T)] = samples.inside(index).reshape(len(near), -1).mean(axis=1)
+    inside = samples.inside(samples.of_voxels(near))
+    fraction[tuple(near.T)] = inside.reshape(len(near), -1).mean(axis=1)
     return fraction
 
 

@@ -101,7 +101,6 @@ def plain_gltf(content: bytes, beside: ReadBeside, name: str) -> bytes:
 
 
 def _parts(content: bytes) -> tuple[Header, bytes]:
-    """Header and binary chunk."""
     if not content.startswith(_MAGIC):
         return json.loads(content), b""
     place, header, binary = 12, {}, b""
@@ -158,8 +157,6 @@ def _require_tree(nodes: list[Header]) -> None:
 
 
 class _Data:
-    """The one buffer of a GLB."""
-
     def __init__(self) -> None:
         self._views: list[Header] = []
         self._accessors: list[Header] = []
@@ -185,8 +182,6 @@ class _Data:
 
 
 class _Reader:
-    """Values of the accessors of a glTF file."""
-
     def __init__(self, header: Header, binary: bytes, beside: ReadBeside, name: str) -> None:
         self._header, self._binary, self._beside, self._name = header, binary, beside, name
         self._read: dict[str, bytes] = {}

@@ -90,7 +90,6 @@ def _only(flags: Flags, patch: Index) -> Flags:
 
 
 def _require_one_side(facets: Facets, both: Flags, name: str) -> None:
-    """Raise UserError if all triangles, or all of a closed patch, are there both ways."""
     if not both.any():
         return
     edge, _, counts = facets.edges

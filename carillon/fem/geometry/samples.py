@@ -40,6 +40,11 @@ class SamplePoints:
         index = np.indices(self._shape).reshape(3, -1).T
         return self.inside(self._count * index + self._count // 2).reshape(self._shape)
 
+    def of_voxels(self, voxels: Index) -> Index:
+        """Indices (v * count^3, 3) of the points in voxels (v, 3)."""
+        offsets = np.indices((self._count,) * 3).reshape(3, -1).T
+        return (self._count * voxels[:, None, :] + offsets).reshape(-1, 3)
+
     def inside(self, index: Index) -> Flags:
         """Whether the points with indices (p, 3) among those of the whole grid are inside."""
         if self._lines is None:

@@ -145,7 +145,6 @@ def _read(path: Path) -> trimesh.Trimesh:
 
 
 def _loaded(path: Path) -> Any:
-    """What trimesh reads of a file, in a form that it reads rightly."""
     nothing = NoFiles(str(path))
     kind = path.suffix.lstrip(".").lower()
     content: bytes | None = None

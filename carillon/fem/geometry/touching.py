@@ -5,7 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from carillon.arrays import Array, Flags, Index
+from carillon.arrays import Flags, Surface
+from carillon.fem.geometry.grid import Grid
 
 LONGEST = 0.5
 """Edges [voxels] to which triangles are cut so that no voxel is missed that matters."""
@@ -15,23 +16,15 @@ _ROOM = 256
 """Triangles that wait to be cut, to begin with."""
 
 
-def touched_voxels(
-    vertices: Array, faces: Index, origin: Array, edge: float, shape: tuple[int, ...]
-) -> Flags:
+def touched_voxels(surface: Surface, grid: Grid) -> Flags:
     """Voxels (nx, ny, nz) that hold a vertex once all edges are cut in halves up to `LONGEST`.
 
-    Parameters
-    ----------
-    vertices, faces
-        (v, 3) [m] and (f, 3); what is beside the grid counts as in its outermost voxels.
-    origin, edge
-        Corner (3,) of the grid and edge of a voxel [m].
-    shape
-        Voxels along the axes.
+    What is beside the grid counts as in its outermost voxels.
     """
-    touched = np.zeros(shape, dtype=np.bool_)
-    lengths = np.array([FIRST, LONGEST]) * edge
-    _touch(np.ascontiguousarray(vertices), faces, lengths, origin, edge, touched)
+    touched = np.zeros(grid.shape, dtype=np.bool_)
+    vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
+    lengths = np.array([FIRST, LONGEST]) * grid.edge
+    _touch(np.ascontiguousarray(vertices), faces, lengths, grid.origin, grid.edge, touched)
     return touched
 
 
@@ -49,11 +42,9 @@ def _touch(vertices, faces, longest, origin, edge, touched):  # type: ignore[no-
             corners = waiting[count].copy()
             for side in range(3):
                 a, b = corners[side], corners[(side + 1) % 3]
-                square = 0.0
                 for axis in range(3):
-                    square += (b[axis] - a[axis]) ** 2
                     middle[side, axis] = 0.5 * (a[axis] + b[axis])
-                length[side] = np.sqrt(square)
+                length[side] = np.sqrt(_square(b, a))
             allowed = longest[0] if length.max() > longest[0] else longest[1]
             cuts = 0
             for side in range(3):
