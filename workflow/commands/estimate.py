@@ -77,9 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     jobs = with_costs(with_work(plan(config, cores, nodes * cores), config), medians)
     result = {
         "configuration": str(path),
-        "run_name": "make run"
-        if path == CONFIGURATIONS / f"{DEFAULT_PRESET}.yaml"
-        else "target all",
+        "run_name": "make run" if path == default else "target all",
         "machine": {"nodes": nodes, "cores_per_node": cores},
         **summarised(jobs, nodes * cores),
         "measured": medians[medians.index.isin(jobs["kind"])].reset_index().to_dict("records"),
