@@ -1,10 +1,10 @@
 """Every experiment, each whole in a folder of its own; `carillon study` lists them.
 
-A folder is a study: its command or commands (`COMMANDS` in `__init__.py`), what it measures, its
-tables, plots and page (`study.py` says where they are), its rules (`rules.smk`) and tests. Whoever
-adds or removes the folder adds or removes the study. `config.py` holds its part of the
-configuration: `SECTIONS`, dataclasses of parameters by key, and `LIMITS`, memory and time of its
-rules. `base` is what all of them stand on.
+A folder is a study: its commands (`COMMANDS` in `__init__.py`, and `PAGES`, what is on those that
+its rules make), what it measures, its tables, plots and page (`study.py` says where they are), its
+rules (`rules.smk`) and tests. Whoever adds or removes the folder adds or removes the study.
+`config.py` holds its part of the configuration: `SECTIONS`, dataclasses of parameters by key, and
+`LIMITS`, memory and time of its rules. `base` is what all of them stand on.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from types import ModuleType
 from carillon.command_line.commands import Command
 
 FOLDER = Path(__file__).resolve().parent
+PAGE_COMMAND = "studies.base.page_command"
 
 
 def names() -> list[str]:
@@ -46,10 +47,13 @@ def rules() -> list[Path]:
 
 def commands() -> dict[str, Command]:
     """Commands of all studies by name."""
-    found: dict[str, Command] = {}
+    commands: dict[str, Command] = {}
     for name in names():
-        found |= getattr(import_module(f"studies.{name}"), "COMMANDS", {})
-    return found
+        study = import_module(f"studies.{name}")
+        pages = getattr(study, "PAGES", {}).items()
+        commands |= getattr(study, "COMMANDS", {})
+        commands |= {page: Command(PAGE_COMMAND, f"page: {about}") for page, about in pages}
+    return commands
 
 
 def configurations() -> list[ModuleType]:

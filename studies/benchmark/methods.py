@@ -22,7 +22,7 @@ from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import CHECKS
 from solver.linear import LinearSolver
 from solver.reference.truth import SPARE_MODES, can_count
-from studies.benchmark.further import RIVALS, completed
+from studies.benchmark.further_rivals import RIVALS, completed
 from studies.benchmark.rivals import (
     SlepcConfiguration,
     smallest_without_factor,

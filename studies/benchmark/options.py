@@ -6,7 +6,7 @@ from typing import Annotated
 
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import NumberOfModes, Positive, between
-from studies.benchmark.further import ALL, RIVALS
+from studies.benchmark.further_rivals import ALL, RIVALS
 from studies.benchmark.methods import RIVAL_SECONDS
 from studies.benchmark.table import METHODS
 

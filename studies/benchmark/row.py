@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, cast
 
+import numpy as np
 from mpi4py import MPI
 
 from carillon.command_line.progress import track
@@ -16,11 +17,11 @@ from carillon.processes.blas import blas_name, loaded_blas
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.verification.errors import AUDIBLE_LAST
-from studies.benchmark.further import RIVALS
+from studies.benchmark.further_rivals import RIVALS
 from studies.benchmark.methods import MethodRun, Methods
 from studies.benchmark.options import BenchmarkOptions
 from studies.benchmark.rivals import SlepcConfiguration, configurations
-from studies.benchmark.scores import median, spectrum_error, speedups, spread, tone_error
+from studies.benchmark.scores import spectrum_error, speedups, tone_error
 from studies.benchmark.solid import BenchmarkSolid, make_solid
 from studies.benchmark.table import METHODS
 
@@ -84,9 +85,8 @@ def benchmark_row(
     if reason:
         left_out += tuple(name for name, method in METHODS.items() if method.needs in absent)
     default = SlepcConfiguration.default(comm.size)
-    # Rivals may fail, and compile nothing.
-    brief = Methods(solid, min(WARM_UP_MODES, benchmark.modes), default, options.seed, comm, True)
-    _run_once(brief, (*left_out, *RIVALS))
+    few = min(WARM_UP_MODES, benchmark.modes)
+    _warm_up(Methods(solid, few, default, options.seed, comm, brief=True), left_out)
     methods = Methods(
         solid,
         benchmark.modes,
@@ -112,7 +112,11 @@ def benchmark_row(
         ],
         "runs": {name: len(results) for name, results in runs.items()},
         "failed": failed,
-        "missed": {name: most for name, results in runs.items() if (most := _missed(results))},
+        "missed": {
+            name: most
+            for name, results in runs.items()
+            if (most := max(run.added for run in results))
+        },
         "ranks": comm.size,
         "threads": max((int(library["num_threads"]) for library in loaded_blas()), default=1),
         "blas": blas_name(),
@@ -152,12 +156,12 @@ def row_lines(row: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _run_once(methods: Methods, left_out: tuple[str, ...]) -> None:
-    """Compile and load what every method needs."""
+def _warm_up(brief: Methods, left_out: tuple[str, ...]) -> None:
+    """Compile and load what every method needs; rivals may fail, and compile nothing."""
     for name, method in METHODS.items():
-        if name not in left_out:
-            method.run(methods)
-    methods.release()
+        if name not in left_out and name not in RIVALS:
+            method.run(brief)
+    brief.release()
 
 
 def _tune(methods: Methods) -> dict[SlepcConfiguration, float]:
@@ -215,10 +219,6 @@ def _references(
     return spectra
 
 
-def _missed(runs: list[MethodRun]) -> int:
-    return max((run.added for run in runs), default=0)
-
-
 def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
     return {
         "model": surface_name(options.mesh),
@@ -236,9 +236,10 @@ def _describe(options: ProblemOptions, solid: BenchmarkSolid) -> dict[str, Any]:
 
 def _times(runs: Runs, before: dict[str, float], benchmark: BenchmarkOptions) -> dict[str, Any]:
     """Medians, spreads and ratios; `before` is what the mesh alone needed."""
-    seconds = {name: median([run.seconds for run in results]) for name, results in runs.items()}
+    every = {name: [run.seconds for run in results] for name, results in runs.items()}
+    seconds = {name: float(np.median(each)) for name, each in every.items()}
     planned = {
-        name: median([run.before for run in results]) or 0.0 for name, results in runs.items()
+        name: float(np.median([run.before for run in results])) for name, results in runs.items()
     }
     parts = {
         **before,
@@ -258,9 +259,7 @@ def _times(runs: Runs, before: dict[str, float], benchmark: BenchmarkOptions) ->
             "precompute": sum(parts.values()),
             **{name: seconds.get(name) for name in names},
         },
-        "spread": {
-            name: spread([run.seconds for run in results]) for name, results in runs.items()
-        },
+        "spread": {name: {"min": min(each), "max": max(each)} for name, each in every.items()},
         "precompute_parts": parts,
         "phases": {name: results[-1].phases for name, results in runs.items()},
         "speedup": speedups(seconds, bases),

@@ -1,5 +1,5 @@
 # Wall times of every way to a spectrum, in the report of the run.
-from studies.benchmark import arguments as timing
+from studies.benchmark import config as timing
 
 
 # Methods in alternating runs, on a solid that may be coarser than the model itself.

@@ -15,16 +15,6 @@ from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequenc
 Array = NDArray[np.float64]
 
 
-def median(seconds: Sequence[float]) -> float | None:
-    """Median, None of nothing."""
-    return float(np.median(seconds)) if len(seconds) else None
-
-
-def spread(seconds: Sequence[float]) -> dict[str, float] | None:
-    """Least and greatest, None of nothing."""
-    return {"min": min(seconds), "max": max(seconds)} if len(seconds) else None
-
-
 def spectrum_error(values: Array, exact: Array) -> dict[str, float]:
     """Median, 90th percentile and maximum relative error of the elastic eigenvalues."""
     return eigenvalue_errors(*_elastic(values, exact))

@@ -1,8 +1,13 @@
-"""SLEPc's eigensolvers beside Krylov-Schur in shift-and-invert mode, by options of its database."""
+"""SLEPc's eigensolvers beside Krylov-Schur in shift-and-invert mode, by options of its database.
+
+The basis of LOBPCG's three blocks is not kept independent: SLEPc 3.18 ends with an error of LAPACK
+for blocks of a dozen vectors and more, whatever the preconditioner, and crawls with smaller ones.
+Blocks make generalised Davidson slower.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -19,12 +24,11 @@ from solver.linear.petsc_options import OPTIONS_PREFIX
 from studies.benchmark.rivals import petsc_options
 from studies.benchmark.search import Array, Pairs, RivalSearch, TimeLimit, ascending
 
-STANDARD = (SLEPc.EPS.Type.KRYLOVSCHUR, SLEPc.EPS.Type.EVSL)
+TYPE = SLEPc.EPS.Type
+STANDARD = (TYPE.KRYLOVSCHUR, TYPE.EVSL)
 """Types that are used for a mass that is one, as that of the scaled lumped mass is."""
 BLOCK = 64
 """Vectors that LOBPCG works on together, at most."""
-INNER_STEPS = 10
-"""Steps that Jacobi-Davidson's correction equation is solved by."""
 DEGREE = 1.5
 """Degree of the filter, a polynomial of the stiffness, over the square root of the ratio of the
 spectrum's bound to the interval's end."""
@@ -33,7 +37,7 @@ HALF = 0.5
 ITERATIONS = 100_000
 """Iterations allowed, of which the time limit leaves fewer."""
 MOMENTS = 8
-"""Moments of the contour integrals."""
+"""Moments of the contour integrals (Sakurai-Sugiura)."""
 CHOLESKY = {
     "st_type": "precond",
     "st_ksp_type": "preonly",
@@ -45,69 +49,57 @@ CHOLESKY = {
 Options = Mapping[str, Any]
 
 
-def lobpcg(search: RivalSearch) -> Pairs:
-    """LOBPCG, preconditioned by a Cholesky factorisation of K + sigma M.
-
-    Its basis of three blocks is not kept independent: SLEPc 3.18 ends with an error of LAPACK for
-    blocks of a dozen vectors and more, whatever the preconditioner, and crawls with smaller ones.
-    """
-    block = {"eps_lobpcg_blocksize": min(BLOCK, search.count)}
-    return _solve(search, SLEPc.EPS.Type.LOBPCG, CHOLESKY | block)
-
-
-def davidson(search: RivalSearch) -> Pairs:
-    """Generalised Davidson, preconditioned likewise; blocks of vectors make it slower."""
-    return _solve(search, SLEPc.EPS.Type.GD, CHOLESKY)
-
-
-def jacobi_davidson(search: RivalSearch) -> Pairs:
-    """Jacobi-Davidson, whose correction equation is preconditioned likewise."""
-    inner = {"st_ksp_type": "bcgsl", "st_ksp_max_it": INNER_STEPS}
-    return _solve(search, SLEPc.EPS.Type.JD, CHOLESKY | inner)
-
-
-def contour_integrals(search: RivalSearch) -> Pairs:
-    """Sakurai-Sugiura contour integrals over the interval that holds the eigenvalues."""
+def _contour(search: RivalSearch) -> Options:
     block = -(-2 * search.count // MOMENTS)
-    sizes = {
+    return {
+        "eps_all": None,
         "eps_ciss_blocksize": block,
         "eps_ciss_moments": MOMENTS,
         "eps_ciss_maxblocksize": 2 * block,
+        "rg_type": "interval",
+        "rg_interval_endpoints": _ends(*search.interval, 0.0, 0.0),
     }
-    region = {"rg_type": "interval", "rg_interval_endpoints": _ends(*search.interval, 0.0, 0.0)}
-    return _solve(search, SLEPc.EPS.Type.CISS, {"eps_all": None, **sizes, **region})
 
 
-def filtered(search: RivalSearch) -> Pairs:
-    """Krylov-Schur with a polynomial filter for all eigenvalues up to the last one wanted.
+def _filter(search: RivalSearch) -> Options:
+    """For all eigenvalues up to the last one wanted: a filter with one edge needs a lower degree.
 
-    The rigid motions are among them: a filter with one edge needs a lower degree than with two.
+    The rigid motions are among them.
     """
-    high = search.interval[1]
-    bound = float(sla.norm(search.K, np.inf))
-    options = {
+    high, bound = search.interval[1], float(sla.norm(search.K, np.inf))
+    return {
         "st_type": "filter",
         "st_filter_range": _ends(-high, bound),
         "st_filter_degree": round(DEGREE * np.sqrt(bound / high)),
         "eps_interval": _ends(-high, high),
     }
-    values, vectors = _solve(search, SLEPc.EPS.Type.KRYLOVSCHUR, options)
-    # Copies of the sixfold zero may be missing, so that they are known by their vectors alone.
-    elastic = np.square(search.rigid.T @ vectors).sum(axis=0) < HALF
-    return values[elastic], vectors[:, elastic]
 
 
-def evsl(search: RivalSearch) -> Pairs:
-    """EVSL's filtered Lanczos method for the interval of the elastic eigenvalues."""
-    return _solve(search, SLEPc.EPS.Type.EVSL, {"eps_interval": _ends(*search.interval)})
+OPTIONS: dict[str, Callable[[RivalSearch], Options]] = {
+    TYPE.LOBPCG: lambda search: CHOLESKY | {"eps_lobpcg_blocksize": min(BLOCK, search.count)},
+    TYPE.GD: lambda _: CHOLESKY,
+    # The steps that the correction equation is solved by.
+    TYPE.JD: lambda _: CHOLESKY | {"st_ksp_type": "bcgsl", "st_ksp_max_it": 10},
+    TYPE.CISS: _contour,
+    TYPE.KRYLOVSCHUR: _filter,
+    TYPE.EVSL: lambda search: {"eps_interval": _ends(*search.interval)},
+}
+"""Options of the database by type, without SLEPc's prefix."""
 
 
 def _ends(*numbers: float) -> str:
     return ",".join(repr(float(number)) for number in numbers)
 
 
-def _solve(search: RivalSearch, kind: str, options: Options) -> Pairs:
-    """Elastic pairs by an eigensolver with such options, without SLEPc's prefix."""
+def solve(kind: str, search: RivalSearch) -> Pairs:
+    """Elastic pairs by an eigensolver of `OPTIONS`.
+
+    Raises
+    ------
+    ConvergenceError
+        If SLEPc was built without it, fails or takes too long.
+    """
+    options = OPTIONS[kind](search)
     generalised = kind not in STANDARD
     matrices = [distributed_matrix(matrix, MPI.COMM_SELF) for matrix in (search.K, search.M)]
     problem = SLEPc.EPS.ProblemType
@@ -118,22 +110,27 @@ def _solve(search: RivalSearch, kind: str, options: Options) -> Pairs:
         solver.setOperators(matrices[0], matrices[1] if generalised else None)
         solver.setProblemType(problem.GHEP if generalised else problem.HEP)
         solver.setTolerances(search.tolerance, ITERATIONS)
-        if kind != SLEPc.EPS.Type.CISS:  # which knows no test of its own
+        if kind != TYPE.CISS:  # which knows no test of its own
             solver.setStoppingTest(partial(_stop, search.limit))
         if options.get("st_type") == "precond":
             _deflate(search, solver)
         with petsc_options(options):
             solver.setFromOptions()
             solver.solve()
-        found = solver.getConverged()
-        if found < search.count:
+        converged = solver.getConverged()
+        if converged < search.count:
             search.limit.check()
             raise ConvergenceError(
-                f"SLEPc converged {found} of {search.count} elastic modes in "
+                f"SLEPc converged {converged} of {search.count} elastic modes in "
                 f"{solver.getIterationNumber()} iterations"
             )
-        values = [solver.getEigenvalue(index).real for index in range(found)]
-        return ascending(values, _vectors(solver, matrices[0], found))
+        computed = [solver.getEigenvalue(index).real for index in range(converged)]
+        values, vectors = ascending(computed, _vectors(solver, matrices[0], converged))
+        if kind != TYPE.KRYLOVSCHUR:
+            return values, vectors
+        # Copies of the sixfold zero may be missing, so that they are known by their vectors alone.
+        elastic = np.square(search.rigid.T @ vectors).sum(axis=0) < HALF
+        return values[elastic], vectors[:, elastic]
     except PETSc.Error as error:
         said = str(error).strip().splitlines()[-1].split("] ", 1)[-1]
         raise ConvergenceError(f"SLEPc: {said}") from None

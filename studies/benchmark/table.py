@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from solver.correction.criteria import INTERACTIVE_TOLERANCE
-from studies.benchmark.further import RIVALS
+from studies.benchmark.further_rivals import RIVALS
 from studies.benchmark.methods import (
     CORRECTED_TOLERANCE,
     ROUGH_TOLERANCE,

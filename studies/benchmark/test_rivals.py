@@ -10,7 +10,7 @@ import pytest
 
 from carillon.errors import ConvergenceError
 from solver.analysis.problem import ProblemOptions
-from studies.benchmark.further import RIVALS, UnavailableError
+from studies.benchmark.further_rivals import RIVALS, UnavailableError
 from studies.benchmark.methods import Methods
 from studies.benchmark.options import BenchmarkOptions
 from studies.benchmark.rivals import SlepcConfiguration

@@ -1,5 +1,5 @@
 # How fast the error correction converges on the models of a run.
-from studies.convergence import arguments as convergence
+from studies.convergence import config as convergence
 
 
 rule follow_convergence:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from statistics import median
 from typing import Any
 
@@ -28,38 +28,14 @@ CHANGE = 0.05
 """Root mean square change of Phi z between the materials of a warm start."""
 
 
-@dataclass(frozen=True)
-class EvaluationTimes:
-    """Median processor times of an evaluation on one thread.
+def time_evaluations(problem: DesignProblem, runs: int = 7, seed: int = 0) -> dict[str, Any]:
+    """Median processor times [s] of evaluations near the uniform material, on one thread.
 
-    Attributes
-    ----------
-    cold_seconds : float [s]
-        From nothing.
-    warm_seconds : float [s]
-        From the modes of a material that differs by `CHANGE`.
-    gradient_seconds : float [s]
-        The same, with derivatives of all frequencies and amplitudes.
-    analysis_seconds : float [s]
-        Of the warm one, the modal analysis (wall time); the rest is coarsening.
-    runs : int
-        Measured after one that warms up.
-    n_dofs, modes, coordinates : int
-        Size of what was evaluated.
+    `cold_seconds` are from nothing, `warm_seconds` from the modes of a material that differs by
+    `CHANGE`, `gradient_seconds` the same with derivatives of all frequencies and amplitudes.
+    `analysis_seconds` are the wall time of the warm modal analysis; the rest is coarsening. `runs`
+    were measured after one that warms up; `n_dofs`, `modes`, `coordinates` are sizes.
     """
-
-    cold_seconds: float
-    warm_seconds: float
-    gradient_seconds: float
-    analysis_seconds: float
-    runs: int
-    n_dofs: int
-    modes: int
-    coordinates: int
-
-
-def time_evaluations(problem: DesignProblem, runs: int = 7, seed: int = 0) -> EvaluationTimes:
-    """Median times of evaluations near the uniform material."""
     with one_thread():
         simulation = problem.setting.simulation()
         size = simulation.material.dimensions
@@ -70,16 +46,16 @@ def time_evaluations(problem: DesignProblem, runs: int = 7, seed: int = 0) -> Ev
         cold, _ = _timed(lambda k: simulation.evaluate(moves[k]), runs)
         warm, analysis = _timed(lambda k: simulation.evaluate(moves[k], here.modes), runs)
         gradient, _ = _timed(lambda k: simulation.evaluate(moves[k], here.modes, True), runs)
-    return EvaluationTimes(
-        median(cold),
-        median(warm),
-        median(gradient),
-        median(analysis),
-        runs,
-        simulation.model.n_dofs,
-        simulation.modes,
-        size,
-    )
+    return {
+        "cold_seconds": median(cold),
+        "warm_seconds": median(warm),
+        "gradient_seconds": median(gradient),
+        "analysis_seconds": median(analysis),
+        "runs": runs,
+        "n_dofs": simulation.model.n_dofs,
+        "modes": simulation.modes,
+        "coordinates": size,
+    }
 
 
 def compare_optimisers(
@@ -128,7 +104,7 @@ def time_sizes(
         problem = prepare(replace(project, resolution=resolution), targets)
         targets = problem.setting.objective.targets
         times = time_evaluations(problem, runs, project.optimiser.seed)
-        rows.append({"resolution": resolution, **asdict(times)})
+        rows.append({"resolution": resolution, **times})
     return rows
 
 
@@ -144,7 +120,7 @@ def benchmark(
         report("evaluations")
     times = time_evaluations(problem, runs, problem.project.optimiser.seed)
     rows = compare_optimisers(problem, seeds, fine_check, report)
-    return {"evaluation": asdict(times), "rows": rows}
+    return {"evaluation": times, "rows": rows}
 
 
 def _outcome(design: Design) -> dict[str, Any]:

@@ -30,7 +30,7 @@ FIGURES = Study(
         ),
         Figure(
             "{shape}-scaling",
-            "studies.scaling.figure:scaling_figure",
+            "studies.scaling.plot:scaling_figure",
             "models/{shape}/scaling.json",
             of="figures.scaling",
         ),

@@ -17,7 +17,5 @@ COMMANDS = {
         room="forests",
         in_room="benchmark",
     ),
-    "forests_study": Command(
-        "studies.base.page_command", "page: what the default forests are worth"
-    ),
 }
+PAGES = {"forests_study": "what the default forests are worth"}

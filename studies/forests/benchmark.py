@@ -6,7 +6,6 @@ import logging
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -59,83 +58,6 @@ class ForestBenchmarkOptions:
     )
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Microseconds of a block in warm runs, and how many runs there were."""
-
-    median: float
-    min: float
-    max: float
-    runs: int
-
-
-@dataclass(frozen=True)
-class Rival:
-    """scikit-learn's `predict` and ours for the same trees on the same blocks, on one core.
-
-    Attributes
-    ----------
-    trees : int
-        Of each forest.
-    leaves : int
-        Of all trees.
-    predict, coarsen : Timing
-        `coarsen` also computes the features, which `predict` is given.
-    ratio : float
-        How many times as fast ours is.
-    difference : float
-        Largest relative one of the moduli.
-    """
-
-    trees: int
-    leaves: int
-    predict: Timing
-    coarsen: Timing
-    ratio: float
-    difference: float
-
-
-@dataclass(frozen=True)
-class SizeTiming:
-    """A forest of complete trees; microseconds of a block, nanoseconds of one walk down a tree."""
-
-    megabytes: float
-    trees: int
-    depth: int
-    random: Timing
-    coherent: Timing
-    random_walk_ns: float
-    coherent_walk_ns: float
-
-
-@dataclass(frozen=True)
-class Result:
-    """All measurements.
-
-    Attributes
-    ----------
-    evaluation : dict
-        Timings by name and threads.
-    load_ms : float
-        Median time of loading the model [ms], checks included.
-    compiled_for : str
-        Processor that numba compiles for.
-    """
-
-    model: str
-    megabytes: float
-    trees: int
-    leaves: int
-    blocks: int
-    load_ms: float
-    evaluation: dict[str, Timing]
-    rival: Rival
-    sizes: list[SizeTiming]
-    caches: dict[str, str]
-    processor: str
-    compiled_for: str
-
-
 def _warm_seconds(function: Callable[[], object]) -> list[float]:
     """Seconds of each of the timed runs of a function."""
     function()
@@ -147,11 +69,12 @@ def _warm_seconds(function: Callable[[], object]) -> list[float]:
     return seconds
 
 
-def timed(function: Callable[[], object], blocks: int) -> Timing:
-    """Time a function that works on so many blocks."""
+def timed(function: Callable[[], object], blocks: int) -> dict[str, float]:
+    """Microseconds of a block in warm `runs` of a function that works on so many blocks."""
     seconds = _warm_seconds(function)
-    low, middle, high = (1e6 * pick(seconds) / blocks for pick in (min, statistics.median, max))
-    return Timing(middle, low, high, RUNS)
+    low, middle, high = (min(seconds), statistics.median(seconds), max(seconds))
+    micro = 1e6 / blocks
+    return {"median": micro * middle, "min": micro * low, "max": micro * high, "runs": RUNS}
 
 
 def caches(folder: Path = CACHE_FOLDER) -> dict[str, str]:
@@ -199,8 +122,13 @@ def _scikit_forests(trees: int, leaves: int) -> tuple[list[Any], Model]:
     return estimators, Model("none", 0.25, "log", join(*parts), {}, {})
 
 
-def against_scikit_learn(young: Array, trees: int, leaves: int) -> Rival:
-    """Measure both on blocks (m, 8), with trees of so many leaves that scikit-learn grows here."""
+def against_scikit_learn(young: Array, trees: int, leaves: int) -> dict[str, Any]:
+    """scikit-learn's `predict` and `coarsen` on blocks (m, 8), for trees of so many leaves.
+
+    `coarsen` computes the features as well, which `predict` is given. `ratio` says how many times
+    as fast it is, `difference` the largest relative one of the moduli; `leaves` are those of all
+    trees.
+    """
     estimators, model = _scikit_forests(trees, leaves)
     prepared = prepare(young, model.transform)
     features = [prepared.features[prepared.filled == bool(kind)] for kind in (VOID, FILLED)]
@@ -214,32 +142,41 @@ def against_scikit_learn(young: Array, trees: int, leaves: int) -> Rival:
     expected *= prepared.scale
     theirs = timed(predict, len(young))
     ours = timed(lambda: coarsen(model, young), len(young))
-    return Rival(
-        trees,
-        len(model.forests.leaves),
-        theirs,
-        ours,
-        theirs.median / ours.median,
-        float(np.abs(coarsen(model, young) / expected - 1.0).max()),
-    )
+    return {
+        "trees": trees,
+        "leaves": len(model.forests.leaves),
+        "predict": theirs,
+        "coarsen": ours,
+        "ratio": theirs["median"] / ours["median"],
+        "difference": float(np.abs(coarsen(model, young) / expected - 1.0).max()),
+    }
 
 
-def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[SizeTiming]:
-    """Measure forests of complete trees on random blocks and on those of a mesh."""
-    timings = []
+def over_size(sizes: Sequence[tuple[int, int]], young: Array, mesh: Array) -> list[dict[str, Any]]:
+    """Forests of complete trees on random blocks and on those of a mesh; ns of a walk down one."""
+    rows = []
     for trees, depth in track(sizes, "forests of growing size", unit="forests"):
         model = complete_forests(trees, depth)
         random = timed(partial(coarsen, model, young), len(young))
         coherent = timed(partial(coarsen, model, mesh), len(mesh))
-        walks = [1e3 * timing.median / (8 * trees) for timing in (random, coherent)]
-        timings.append(
-            SizeTiming(model.nbytes / 1e6, trees, depth, random, coherent, walks[0], walks[1])
-        )
-    return timings
+        row = {
+            "megabytes": model.nbytes / 1e6,
+            "trees": trees,
+            "depth": depth,
+            "random": random,
+            "coherent": coherent,
+            "random_walk_ns": 1e3 * random["median"] / (8 * trees),
+            "coherent_walk_ns": 1e3 * coherent["median"] / (8 * trees),
+        }
+        rows.append(row)
+    return rows
 
 
-def benchmark(options: ForestBenchmarkOptions) -> Result:
-    """Measure forests.
+def benchmark(options: ForestBenchmarkOptions) -> dict[str, Any]:
+    """Measure forests: timings by `evaluation` and threads, the `rival`, forests of all `sizes`.
+
+    `load_ms` is the median time of loading the model, checks included; `compiled_for` the
+    processor that numba compiles for.
 
     Raises
     ------
@@ -259,63 +196,58 @@ def benchmark(options: ForestBenchmarkOptions) -> Result:
         for threads in THREADS
     }
     evaluation["coarsen, 1 thread, blocks of a mesh"] = timed(partial(coarsen, model, mesh), blocks)
-    leaves = len(model.forests.leaves)
+    trees, leaves = model.forests.trees, len(model.forests.leaves)
     logger.info("growing trees of scikit-learn")
-    rival = against_scikit_learn(young, model.forests.trees, leaves // (2 * model.forests.trees))
+    rival = against_scikit_learn(young, trees, leaves // (2 * trees))
     sizes = [
         (trees, depth)
         for trees, depth in SIZES
         if 2 * trees * BYTES_OF_LEAF * 2**depth <= 1e6 * options.largest
     ]
-    return Result(
-        model=str(path),
-        megabytes=model.nbytes / 1e6,
-        trees=model.forests.trees,
-        leaves=leaves,
-        blocks=blocks,
-        load_ms=1e3 * statistics.median(_warm_seconds(partial(load_model, path))),
-        evaluation=evaluation,
-        rival=rival,
-        sizes=over_size(sizes, young, mesh),
-        caches=caches(),
-        processor=provenance.processor(),
-        compiled_for=provenance.compiled_for(),
-    )
+    return {
+        "model": str(path),
+        "megabytes": model.nbytes / 1e6,
+        "trees": trees,
+        "leaves": leaves,
+        "blocks": blocks,
+        "load_ms": 1e3 * statistics.median(_warm_seconds(partial(load_model, path))),
+        "evaluation": evaluation,
+        "rival": rival,
+        "sizes": over_size(sizes, young, mesh),
+        "caches": caches(),
+        "processor": provenance.processor(),
+        "compiled_for": provenance.compiled_for(),
+    }
 
 
-def as_json(result: Result) -> dict[str, Any]:
-    """The result as plain values."""
-    return asdict(result)
-
-
-def _line(name: str, timing: Timing) -> str:
-    return f"{name:<42}{timing.median:>8.2f}{timing.min:>8.2f}{timing.max:>8.2f}"
-
-
-def as_text(result: Result) -> str:
+def as_text(result: dict[str, Any]) -> str:
     """The result in columns."""
-    rival = result.rival
+
+    def line(name: str, timing: dict[str, float]) -> str:
+        return f"{name:<42}{timing['median']:>8.2f}{timing['min']:>8.2f}{timing['max']:>8.2f}"
+
+    rival = result["rival"]
     lines = [
-        f"{result.processor}, compiled for {result.compiled_for}, caches "
-        + ", ".join(f"{level} {size}" for level, size in result.caches.items()),
-        f"{result.model}: 2 x {result.trees} trees, {result.leaves:,} leaves, "
-        f"{result.megabytes:.1f} MB, loaded in {result.load_ms:.1f} ms",
-        f"{result.blocks:,} random blocks, {RUNS} warm runs",
+        f"{result['processor']}, compiled for {result['compiled_for']}, caches "
+        + ", ".join(f"{level} {size}" for level, size in result["caches"].items()),
+        f"{result['model']}: 2 x {result['trees']} trees, {result['leaves']:,} leaves, "
+        f"{result['megabytes']:.1f} MB, loaded in {result['load_ms']:.1f} ms",
+        f"{result['blocks']:,} random blocks, {RUNS} warm runs",
         f"{'microseconds of a block':<42}{'median':>8}{'min':>8}{'max':>8}",
-        *(_line(name, timing) for name, timing in result.evaluation.items()),
+        *(line(name, timing) for name, timing in result["evaluation"].items()),
         "",
-        f"trees of scikit-learn, 2 x {rival.trees} with {rival.leaves:,} leaves, one core",
-        _line("predict of scikit-learn, features given", rival.predict),
-        _line("coarsen, the same trees", rival.coarsen),
-        f"{rival.ratio:.1f} times as fast, moduli differ by {rival.difference:.1e} at most",
+        f"trees of scikit-learn, 2 x {rival['trees']} with {rival['leaves']:,} leaves, one core",
+        line("predict of scikit-learn, features given", rival["predict"]),
+        line("coarsen, the same trees", rival["coarsen"]),
+        f"{rival['ratio']:.1f} times as fast, moduli differ by {rival['difference']:.1e} at most",
         "",
         f"{'complete trees, one core':<28}{'random blocks':>20}{'blocks of a mesh':>20}",
         f"{'MB':>8}{'trees':>10}{'depth':>10}" + 2 * f"{'us/block':>10}{'ns/walk':>10}",
     ]
     lines += [
-        f"{size.megabytes:>8.1f}{f'2 x {size.trees}':>10}{size.depth:>10}"
-        f"{size.random.median:>10.2f}{size.random_walk_ns:>10.1f}"
-        f"{size.coherent.median:>10.2f}{size.coherent_walk_ns:>10.1f}"
-        for size in result.sizes
+        f"{size['megabytes']:>8.1f}{'2 x ' + str(size['trees']):>10}{size['depth']:>10}"
+        f"{size['random']['median']:>10.2f}{size['random_walk_ns']:>10.1f}"
+        f"{size['coherent']['median']:>10.2f}{size['coherent_walk_ns']:>10.1f}"
+        for size in result["sizes"]
     ]
     return "\n".join(lines)

@@ -20,5 +20,4 @@ def run(arguments: argparse.Namespace) -> None:
     """Measure and print."""
     require_outputs(arguments, [arguments.forest] if arguments.forest else [])
     result = benchmark.benchmark(collect(benchmark.ForestBenchmarkOptions, arguments))
-    text = benchmark.as_text(result)
-    publish(arguments, benchmark.as_json(result), text, max(benchmark.THREADS))
+    publish(arguments, result, benchmark.as_text(result), max(benchmark.THREADS))

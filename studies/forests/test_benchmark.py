@@ -56,14 +56,15 @@ def test_complete_forests_have_all_leaves_and_spread_the_blocks(path):
 
 def test_measurements_are_complete_and_agree_with_scikit_learn(path):
     result = benchmark(ForestBenchmarkOptions(str(path), blocks=300, largest=1.0))
-    assert result.leaves == 256 and result.load_ms > 0
-    assert len(result.evaluation) == 5
-    for timing in (*result.evaluation.values(), result.rival.predict, result.rival.coarsen):
-        assert 0 < timing.min <= timing.median <= timing.max and timing.runs >= 7
-    assert result.rival.difference < 1e-5 and result.rival.leaves > 200
-    (size,) = result.sizes
-    assert (size.trees, size.depth) == SIZES[0] and 0.5 < size.megabytes < 1.0
-    np.testing.assert_allclose(size.random_walk_ns, 1e3 * size.random.median / 24)
+    assert result["leaves"] == 256 and result["load_ms"] > 0
+    evaluation, rival = result["evaluation"], result["rival"]
+    assert len(evaluation) == 5
+    for timing in (*evaluation.values(), rival["predict"], rival["coarsen"]):
+        assert 0 < timing["min"] <= timing["median"] <= timing["max"] and timing["runs"] >= 7
+    assert rival["difference"] < 1e-5 and rival["leaves"] > 200
+    (size,) = result["sizes"]
+    assert (size["trees"], size["depth"]) == SIZES[0] and 0.5 < size["megabytes"] < 1.0
+    np.testing.assert_allclose(size["random_walk_ns"], 1e3 * size["random"]["median"] / 24)
 
 
 def test_sizes_reach_from_one_to_five_hundred_megabytes():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict
 
 from carillon.parameters.command_line import add_options, collect
 from carillon.records.measurement import measured
@@ -32,7 +31,6 @@ def run(arguments: argparse.Namespace) -> None:
         described = collect(ProblemOptions, arguments)
         model = build_problem(described).model
         result = profile(model, collect(ProfileOptions, arguments), described.seed)
-        content = {**asdict(result), "provenance": measured(parameters(arguments))}
-        write_json(arguments, content, comm)
-    text = json.dumps(content, indent=2) if arguments.json else "\n".join(profile_lines(result))
-    print(text)
+        result["provenance"] = measured(parameters(arguments))
+        write_json(arguments, result, comm)
+    print(json.dumps(result, indent=2) if arguments.json else "\n".join(profile_lines(result)))

@@ -11,7 +11,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, cast
 
 import numpy as np
@@ -61,7 +61,7 @@ class Phase:
     Attributes
     ----------
     seconds
-        Wall time; the median of all runs in a `Profile`.
+        Wall time; the median of all runs in a profile.
     operations, bytes
         Floating-point operations, and bytes between memory and processor at least; 0 if not known.
     """
@@ -69,36 +69,6 @@ class Phase:
     seconds: float = 0.0
     operations: float = 0.0
     bytes: float = 0.0
-
-
-@dataclass(frozen=True)
-class Profile:
-    """Phases of a solve by name, and what the machine can do.
-
-    Attributes
-    ----------
-    n_dofs, modes, right_hand_sides, block
-        Size of the problem, and columns of a block of right-hand sides.
-    threads, runs
-        Threads of the measurement, and of how many runs medians are taken.
-    seconds
-        From moduli to verified modes, by `ModalSolver.solve`; median.
-    phases
-        See `Phase`.
-    gflops_dgemm, gbytes_memory
-        Rates of a product of large matrices and of a copy (read and written), on all threads.
-    """
-
-    n_dofs: int
-    modes: int
-    right_hand_sides: int
-    block: int
-    threads: int
-    runs: int
-    seconds: float
-    phases: dict[str, Phase]
-    gflops_dgemm: float
-    gbytes_memory: float
 
 
 @dataclass
@@ -161,8 +131,16 @@ class _MeteredInverse:
             return self._inverse.solve(block)
 
 
-def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> Profile:
+def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, Any]:
     """Measure the phases of `--method auto` on one rank; `seed` is that of the random vectors.
+
+    Returns
+    -------
+    dict[str, Any]
+        Plain values: sizes, and columns of a `block` of right-hand sides; `threads`, and of how
+        many `runs` medians are taken; `seconds` from moduli to verified modes by
+        `ModalSolver.solve`; `phases` by name, see `Phase`; rates of a product of large matrices
+        and of a copy (read and written) on all threads.
 
     Raises
     ------
@@ -185,11 +163,11 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> Profile:
     layout = Layout.of_local_mesh(solver.local_mesh, MPI.COMM_SELF)
     linear = LinearSolver("multifrontal", layout)
     threads = system.rows.threads
-    wanted = options.modes - RIGID_MODES
+    elastic = options.modes - RIGID_MODES
     law = CountingLaw.of_solid(model, model.young, options.modes)
-    width = carried_count(wanted, EIGENVALUE_TOLERANCE)
-    accurate = accurate_count(wanted, EIGENVALUE_TOLERANCE)
-    cold = from_nothing(system, linear, wanted, accurate, width, law, EIGENVALUE_TOLERANCE, seed)
+    width = carried_count(elastic, EIGENVALUE_TOLERANCE)
+    accurate = accurate_count(elastic, EIGENVALUE_TOLERANCE)
+    cold = from_nothing(system, linear, elastic, accurate, width, law, EIGENVALUE_TOLERANCE, seed)
     found, shift = cold.result, cold.inverse.shift
     cold.inverse.destroy()
     del cold
@@ -199,25 +177,22 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> Profile:
         meters.append(_Meter())
         _replay(system, linear, shift, start, found.blocks, width, meters[-1])
     phases = {
-        name: Phase(
-            statistics.median(meter.phases[name].seconds for meter in meters),
-            phase.operations,
-            phase.bytes,
-        )
+        name: asdict(phase)
+        | {"seconds": statistics.median(meter.phases[name].seconds for meter in meters)}
         for name, phase in meters[0].phases.items()
     }
-    return Profile(
-        model.n_dofs,
-        options.modes,
-        found.solves,
-        start.shape[1],
-        threads,
-        options.runs,
-        statistics.median(whole[1:]),
-        phases,
-        dgemm_rate(),
-        memory_rate(threads),
-    )
+    return {
+        "n_dofs": model.n_dofs,
+        "modes": options.modes,
+        "right_hand_sides": found.solves,
+        "block": start.shape[1],
+        "threads": threads,
+        "runs": options.runs,
+        "seconds": statistics.median(whole[1:]),
+        "phases": phases,
+        "gflops_dgemm": dgemm_rate(),
+        "gbytes_memory": memory_rate(threads),
+    }
 
 
 def _timed(solve: Callable[[], Any]) -> tuple[Any, float]:
@@ -280,22 +255,24 @@ def memory_rate(threads: int) -> float:
     return 2e-9 * source.nbytes / statistics.median(seconds)
 
 
-def profile_lines(result: Profile) -> list[str]:
+def profile_lines(result: dict[str, Any]) -> list[str]:
     """The result as a table."""
     lines = [
-        f"{result.n_dofs:,} unknowns, {result.modes} modes: {result.right_hand_sides} right-hand "
-        f"sides in blocks of {result.block}, {result.threads} threads; dgemm "
-        f"{result.gflops_dgemm:.0f} GFLOP/s, memory {result.gbytes_memory:.1f} GB/s",
+        f"{result['n_dofs']:,} unknowns, {result['modes']} modes: {result['right_hand_sides']} "
+        f"right-hand sides in blocks of {result['block']}, {result['threads']} threads; dgemm "
+        f"{result['gflops_dgemm']:.0f} GFLOP/s, memory {result['gbytes_memory']:.1f} GB/s",
         f"{'phase':<20}{'s':>8}{'share':>8}{'GFLOP/s':>9}{'dgemm':>7}{'GB/s':>9}{'memory':>7}",
     ]
-    phases = result.phases
-    rest = result.seconds - sum(phase.seconds for phase in phases.values())
-    for name, phase in {**phases, "assembly, checks": Phase(max(rest, 0.0))}.items():
-        line = f"{name:<20}{phase.seconds:>8.3f}{phase.seconds / result.seconds:>8.0%}"
-        line += _rate(phase.operations, phase.seconds, result.gflops_dgemm)
-        line += _rate(phase.bytes, phase.seconds, result.gbytes_memory)
+    phases = result["phases"]
+    rest = result["seconds"] - sum(phase["seconds"] for phase in phases.values())
+    others = {"assembly, checks": asdict(Phase(max(rest, 0.0)))}
+    for name, phase in {**phases, **others}.items():
+        seconds = phase["seconds"]
+        line = f"{name:<20}{seconds:>8.3f}{seconds / result['seconds']:>8.0%}"
+        line += _rate(phase["operations"], seconds, result["gflops_dgemm"])
+        line += _rate(phase["bytes"], seconds, result["gbytes_memory"])
         lines.append(line.rstrip())
-    return [*lines, f"{'whole solve':<20}{result.seconds:>8.3f}"]
+    return [*lines, f"{'whole solve':<20}{result['seconds']:>8.3f}"]
 
 
 def _rate(amount: float, seconds: float, best: float) -> str:

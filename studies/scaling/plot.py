@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 from carillon.files.atomic import atomic_path
+from studies.base.colours import INK
+from studies.base.results import Results
+from studies.base.style import SETTINGS
 from studies.scaling.model import MODELLED, kind
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 COLOURS = dict(
     zip(
@@ -19,7 +21,6 @@ COLOURS = dict(
         strict=True,
     )
 )
-INK = "#23211d"
 TITLES = {"strong": "Strong: one solid", "weak": "Weak: unknowns grow with ranks"}
 NARROWEST = 7.6
 """Inches that the legend needs."""
@@ -28,30 +29,21 @@ SMALLEST = 1e-4
 
 
 def save_plot(result: dict[str, Any], path: str | Path) -> None:
-    """Write the plot of a scaling study; the ending of `path` decides the format."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    figure = scaling_figure(result)
+    """Write the plot of a scaling study on white; the ending of `path` decides the format."""
+    ending = Path(path).suffix[1:].lower()
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format=Path(path).suffix[1:].lower(), dpi=160)
+        _figure(result).savefig(temporary, format=ending, dpi=160, facecolor="white")
 
 
-def scaling_figure(result: dict[str, Any], settings: Mapping[str, Any] | None = None) -> Figure:
-    """Wall time over ranks, a panel for strong and one for weak scaling.
+def scaling_figure(results: Results, model: str) -> Figure:
+    """Measured and modelled wall times over the number of ranks, in pages."""
+    return _figure(results.read_json(f"models/{model}/scaling.json"))
 
-    Parameters
-    ----------
-    result
-        Output of `solver scaling`.
-    settings
-        Matplotlib's, to be drawn with.
-    """
-    from matplotlib import pyplot as plt  # slow to import, and only needed here
 
+def _figure(result: dict[str, Any]) -> Figure:
+    """Wall time over ranks, a panel for strong and one for weak scaling."""
     shown = [name for name in TITLES if result[name] is not None]
-    chosen: Any = {"figure.constrained_layout.use": True, **(settings or {})}
-    with plt.rc_context(chosen):
+    with plt.rc_context(SETTINGS):
         size = (max(NARROWEST, 4.2 * len(shown)), 4.2)
         figure, axes = plt.subplots(1, len(shown), figsize=size, squeeze=False)
         for axis, name in zip(axes[0], shown, strict=True):

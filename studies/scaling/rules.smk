@@ -1,6 +1,6 @@
 # Wall time over MPI ranks, in the report of the run: a small solid on few ranks. More of both are
 # part of target figures.
-from studies.scaling import arguments as scaling
+from studies.scaling import config as scaling
 
 
 # It starts the ranks itself, one thread each.

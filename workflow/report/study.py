@@ -75,7 +75,7 @@ REPORT = Study(
         ),
         Figure(
             "{model}-scaling",
-            "studies.scaling.figure:scaling_figure",
+            "studies.scaling.plot:scaling_figure",
             "models/{model}/scaling.json",
             of="scaling.models",
         ),

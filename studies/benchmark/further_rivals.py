@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -15,7 +16,7 @@ from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.reference.truth import Truth, can_count, complete, count_beyond
 from solver.subspace.rayleigh_ritz import rigid_pairs
-from studies.benchmark import primme_rivals, scipy_rivals, slepc_rivals
+from studies.benchmark import python_rivals, slepc_rivals
 from studies.benchmark.search import Array, Pairs, RivalSearch
 
 REQUIREMENTS = "workflow/envs/requirements-rivals.txt"
@@ -38,7 +39,7 @@ class FurtherRival:
     packages
         Optional Python packages that it needs.
     eps_type
-        SLEPc's eigensolver that it needs, which may not be built in.
+        SLEPc's eigensolver that it is, which may not be built in.
     interval
         Whether it finds what is in an interval, and no number of pairs.
     lumped
@@ -64,73 +65,58 @@ class FurtherRival:
                     f"{package} cannot be loaded ({one_line(str(error))}); install it by pip "
                     f"install -r {REQUIREMENTS}"
                 ) from None
-        if self.eps_type is not None and not _built_in(self.eps_type):
-            raise UnavailableError(f"this SLEPc was built without {self.eps_type}")
+        if self.eps_type is not None:
+            solver = SLEPc.EPS().create(MPI.COMM_SELF)
+            try:
+                solver.setType(self.eps_type)
+            except PETSc.Error:
+                raise UnavailableError(f"this SLEPc was built without {self.eps_type}") from None
+            finally:
+                solver.destroy()
 
 
+def _slepc(kind: str, meaning: str, interval: bool = False, lumped: bool = False) -> FurtherRival:
+    search = partial(slepc_rivals.solve, kind)
+    return FurtherRival(meaning, search, eps_type=kind, interval=interval, lumped=lumped)
+
+
+_TOLD = "for an interval that it is told"
 RIVALS = {
     "scipy_superlu": FurtherRival(
         "ARPACK by SciPy in shift-and-invert mode, factorised by SuperLU",
-        scipy_rivals.arpack_superlu,
+        python_rivals.arpack_superlu,
     ),
     "scipy_lobpcg": FurtherRival(
         "LOBPCG by SciPy, preconditioned by PyAMG's smoothed aggregation",
-        scipy_rivals.lobpcg_multigrid,
+        python_rivals.lobpcg_multigrid,
         ("pyamg",),
     ),
     "primme_direct": FurtherRival(
         "PRIMME's block Davidson method (GD+k), preconditioned by Carillon's own factorisation",
-        primme_rivals.davidson_direct,
+        python_rivals.davidson_direct,
         ("primme",),
     ),
     "primme_multigrid": FurtherRival(
         "the same, preconditioned by PyAMG's smoothed aggregation",
-        primme_rivals.davidson_multigrid,
+        python_rivals.davidson_multigrid,
         ("primme", "pyamg"),
     ),
-    "slepc_lobpcg": FurtherRival(
-        "LOBPCG by SLEPc, preconditioned by a sparse Cholesky factorisation",
-        slepc_rivals.lobpcg,
+    "slepc_lobpcg": _slepc(
+        "lobpcg", "LOBPCG by SLEPc, preconditioned by a sparse Cholesky factorisation"
     ),
-    "slepc_gd": FurtherRival(
-        "generalised Davidson by SLEPc, preconditioned likewise", slepc_rivals.davidson
+    "slepc_gd": _slepc("gd", "generalised Davidson by SLEPc, preconditioned likewise"),
+    "slepc_jd": _slepc("jd", "Jacobi-Davidson by SLEPc, preconditioned likewise"),
+    "slepc_ciss": _slepc(
+        "ciss", "contour integrals by SLEPc over an interval that it is told", interval=True
     ),
-    "slepc_jd": FurtherRival(
-        "Jacobi-Davidson by SLEPc, preconditioned likewise", slepc_rivals.jacobi_davidson
+    "slepc_filter": _slepc(
+        "krylovschur", f"Krylov-Schur by SLEPc with a polynomial filter {_TOLD}", True, True
     ),
-    "slepc_ciss": FurtherRival(
-        "contour integrals by SLEPc over an interval that it is told",
-        slepc_rivals.contour_integrals,
-        interval=True,
-    ),
-    "slepc_filter": FurtherRival(
-        "Krylov-Schur by SLEPc with a polynomial filter for an interval that it is told",
-        slepc_rivals.filtered,
-        interval=True,
-        lumped=True,
-    ),
-    "slepc_evsl": FurtherRival(
-        "filtered Lanczos by EVSL for an interval that it is told",
-        slepc_rivals.evsl,
-        eps_type=SLEPc.EPS.Type.EVSL,
-        interval=True,
-        lumped=True,
-    ),
+    "slepc_evsl": _slepc("evsl", f"filtered Lanczos by EVSL {_TOLD}", True, True),
 }
 """Rivals in the order of the table."""
 ALL = "all"
 """Stands for every one of them."""
-
-
-def _built_in(eps_type: str) -> bool:
-    solver = SLEPc.EPS().create(MPI.COMM_SELF)
-    try:
-        solver.setType(eps_type)
-    except PETSc.Error:
-        return False
-    finally:
-        solver.destroy()
-    return True
 
 
 def completed(search: RivalSearch, pairs: Pairs, modes: int) -> tuple[Array, int]:
