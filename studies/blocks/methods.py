@@ -63,29 +63,6 @@ class Method:
         return (self.flexibility or self.coarsen)(young)
 
 
-def direct_fit(objective: str, poisson: float) -> Method:
-    """The fit of an objective to every block on the spot."""
-    return Method(
-        f"{objective}, fitted on the spot", lambda young: fit(objective, young, poisson).moduli
-    )
-
-
-def static_condensation(poisson: float) -> Method:
-    """Condensation to the corners, with a dense stiffness for every block."""
-    return Method(
-        "static condensation",
-        partial(condense, poisson=poisson),
-        flexibility=partial(corner_flexibility, poisson=poisson),
-    )
-
-
-def trained(name: str, model: Model) -> Method:
-    """Regression forests."""
-    seconds = {**model.provenance, **model.scores}.get("training_seconds")
-    training = None if seconds is None else float(seconds)
-    return Method(name, partial(coarsen, model), model.nbytes, training)
-
-
 def methods_of(models: dict[str, Model]) -> list[Method]:
     """All coarsenings that hold for any range of moduli; `models` by the names of their files.
 
@@ -102,19 +79,27 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
     methods = [
         Method("average", average),
         Method("Galerkin", galerkin),
-        static_condensation(poisson),
-        *(direct_fit(objective, poisson) for objective in objectives),
+        Method(
+            "static condensation",
+            partial(condense, poisson=poisson),
+            flexibility=partial(corner_flexibility, poisson=poisson),
+        ),
+        *(
+            Method(f"{name}, fitted on the spot", partial(_fitted, name, poisson))
+            for name in objectives
+        ),
     ]
     for name, model in models.items():
         suffix = f" of {name}" if len(models) > 1 else ""
-        methods.append(trained(f"{model.objective}, forests{suffix}", model))
+        label = f"{model.objective}, forests{suffix}"
+        seconds = {**model.provenance, **model.scores}.get("training_seconds")
+        training = None if seconds is None else float(seconds)
+        methods.append(Method(label, partial(coarsen, model), model.nbytes, training))
     return methods
 
 
-def metamaterials(database: Database, name: str, clamped: bool = False) -> Method:
-    """Lookup in a database of metamaterials [GPa]."""
-    lookup = partial(look_up, database)
-    return Method(name, lookup, database.nbytes, database.seconds, clamped=clamped)
+def _fitted(objective: str, poisson: float, young: Array) -> Array:
+    return fit(objective, young, poisson).moduli
 
 
 def databases_of(
@@ -183,10 +168,11 @@ def database_methods(case: BlockCase, databases: dict[BlockCase, Database]) -> l
     for other, database in databases.items():
         low, high = other.range_gpa
         name = f"Chen et al. 2015, database {low:g}..{high:g} GPa"
-        if other == case:
-            methods.append(metamaterials(database, name))
-        elif other.alike(case) and high < case.range_gpa[1]:
-            methods.append(metamaterials(database, f"{name}, clamped", clamped=True))
+        clamped = other.alike(case) and high < case.range_gpa[1]
+        if other == case or clamped:
+            lookup, suffix = partial(look_up, database), ", clamped" if clamped else ""
+            seconds, size = database.seconds, database.nbytes
+            methods.append(Method(f"{name}{suffix}", lookup, size, seconds, clamped=clamped))
     return methods
 
 

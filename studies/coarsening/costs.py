@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any, TypeVar
+from operator import itemgetter
+from typing import Any, NamedTuple, TypeVar
 
 from mpi4py import MPI
 
@@ -23,35 +23,15 @@ RUNS = 3
 """Alternating runs by the default method, of which the one with the least processor time counts."""
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Wall time and time of all processors [s]."""
-
-    seconds: float
-    processor_seconds: float
+Cost = dict[str, float]
+"""Wall time, `seconds`, and time of all processors, `processor_seconds` [s]."""
 
 
-@dataclass(frozen=True)
-class Taken:
-    """What came of a coarse model.
-
-    Attributes
-    ----------
-    refined
-        The coarse mesh that it ended with.
-    found
-        What was taken.
-    """
+class Taken(NamedTuple):
+    """What came of a coarse model: the coarse mesh that it ended with, and what was taken."""
 
     refined: RefinedModel
     found: CoarseOrFine
-
-    @property
-    def name(self) -> str:
-        """Whether the `coarse`, the `refined` or the `fine` model was taken."""
-        if self.found.reason is not None:
-            return "fine"
-        return "refined" if self.found.steps[-1].refined else "coarse"
 
 
 def take(
@@ -87,20 +67,25 @@ def compare_costs(
         taken, cost = timed(lambda: take(fine, coarsening, tolerance, options))
         taken.found.modes.destroy()
         costs["coarse"].append(cost)
-    least = {name: min(each, key=_processor) for name, each in costs.items()}
+    least = {name: min(each, key=itemgetter("processor_seconds")) for name, each in costs.items()}
     return as_values(modes, taken, least["fine"], least["coarse"])
 
 
 def as_values(modes: int, taken: Taken, fine: Cost, coarse: Cost) -> dict[str, Any]:
-    """Plain values: what was taken and why, costs, and how many times as fast it was."""
+    """Plain values: which model was `taken` and why, costs, and how many times as fast it was."""
+    found = taken.found
+    if found.reason is not None:
+        kept = "fine"
+    else:
+        kept = "refined" if found.steps[-1].refined else "coarse"
     return {
         "modes": modes,
-        "taken": taken.name,
-        "reason": taken.found.reason,
-        "estimates": len(taken.found.steps),
-        "fine": asdict(fine),
-        "coarse": asdict(coarse),
-        "faster": fine.processor_seconds / coarse.processor_seconds,
+        "taken": kept,
+        "reason": found.reason,
+        "estimates": len(found.steps),
+        "fine": fine,
+        "coarse": coarse,
+        "faster": fine["processor_seconds"] / coarse["processor_seconds"],
     }
 
 
@@ -108,8 +93,5 @@ def timed(call: Callable[[], T]) -> tuple[T, Cost]:
     """The result of a call and what it cost."""
     wall, processor = time.perf_counter(), time.process_time()
     result = call()
-    return result, Cost(time.perf_counter() - wall, time.process_time() - processor)
-
-
-def _processor(cost: Cost) -> float:
-    return cost.processor_seconds
+    seconds, spent = time.perf_counter() - wall, time.process_time() - processor
+    return result, {"seconds": seconds, "processor_seconds": spent}

@@ -145,38 +145,24 @@ def _solve(model: Solid | None, modes: int, comm: MPI.Comm) -> Modes:
     return result
 
 
-@dataclass(frozen=True)
-class _Coarsened:
+def _coarsen(name: str, solid: _Solid) -> tuple[ElasticModel, float, float | None]:
     """A coarse model, the seconds its material took, and the share of fits that converged."""
-
-    model: ElasticModel
-    seconds: float
-    converged: float | None
-
-
-def _coarsen(name: str, solid: _Solid) -> _Coarsened:
     fine, coarsening = solid.problem.hexahedra, solid.coarsenings[name]
     # Compiling, or loading what was compiled, is not part of fitting.
     _moduli(coarsening, solid.e[:1])
     begin = time.perf_counter()
     moduli, converged = _moduli(coarsening, solid.e)
     fitted = time.perf_counter() - begin
-    model = coarse_model(
-        solid.blocks,
-        moduli,
-        coarsening.lumped_fraction,
-        poisson=fine.poisson,
-        density=fine.density,
-        lumped=fine.lumped,
-    )
-    return _Coarsened(model, fitted, converged)
+    constants = {name: getattr(fine, name) for name in ("poisson", "density", "lumped")}
+    model = coarse_model(solid.blocks, moduli, coarsening.lumped_fraction, **constants)
+    return model, fitted, converged
 
 
 def _row(name: str, solid: _Solid | None, exact: Array, comm: MPI.Comm) -> dict[str, Any]:
     coarse = compute_on_root(comm, lambda: _coarsen(name, cast(_Solid, solid)))
-    model = None if coarse is None else coarse.model
+    model = None if coarse is None else coarse[0]
     modes, fitted, converged = comm.bcast(
-        coarse and (min(len(exact), coarse.model.n_dofs), coarse.seconds, coarse.converged)
+        coarse and (min(len(exact), coarse[0].n_dofs), *coarse[1:])
     )
     try:
         result = _solve(model, modes, comm)

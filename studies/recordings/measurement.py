@@ -9,9 +9,8 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,18 +24,11 @@ MODES, RESIDUAL, RUN = "modes.json", "residual.wav", "run.json"
 _START_RATE, _START_SAMPLES = 8000, 800
 
 
-@dataclass(frozen=True)
-class Extraction:
-    """One run of the command.
+class Extraction(NamedTuple):
+    """One run of the command, as one would type it.
 
-    Attributes
-    ----------
-    said
-        The sentence of a refusal; empty if there was none.
-    cpu_seconds : float [s]
-        Of user and system, the start of the program included.
-    command
-        As one would type it.
+    `said` is the sentence of a refusal, or empty; `cpu_seconds` are of user and system, the start
+    of the program included.
     """
 
     said: str
@@ -62,8 +54,7 @@ def extract(clip: Path, folder: Path) -> Extraction:
 
 def measure(clip: Path, folder: Path) -> None:
     """Extract the modes of a clip into a folder, and write there how that went."""
-    extraction = extract(clip, folder)
-    _write(folder / RUN, extraction)
+    _write(folder / RUN, extract(clip, folder))
 
 
 def measure_start(path: Path) -> None:
