@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
+from carillon.fem.geometry import Blocks, blocks_from_mesh
 from carillon.fem.materials import smooth_field
 from carillon.fem.model import ElasticModel, Solid
 from solver.analysis.bounds import check_mode_count
@@ -89,7 +89,8 @@ def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
     """
     problem = build_problem(replace(options, coarsen="none"))
     check_mode_count(modes, problem.model.n_dofs)
-    changed = problem.young * _change(problem.fine, options.seed)
+    change = CHANGE * smooth_field(problem.fine, options.seed + _CHANGE_SEED)
+    changed = problem.young * (1.0 + change)
     if not isinstance(problem.model, ElasticModel):
         return BenchmarkSolid(problem, None, changed, None, NOT_COARSENED, problem.seconds)
     forest, reason = forest_or_reason(options.forest, options.poisson)
@@ -110,8 +111,3 @@ def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
         reason,
         {**problem.seconds, "blocks": blocked},
     )
-
-
-def _change(mesh: HexMesh, seed: int) -> Array:
-    """Factors (m,) within 1 - `CHANGE` and 1 + `CHANGE`, smooth over the solid."""
-    return 1.0 + CHANGE * smooth_field(mesh, seed + _CHANGE_SEED)

@@ -84,16 +84,13 @@ class Database:
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays."""
-        return sum(array.nbytes for array in (self.materials, *_stored(self).values()))
+        stored = (self.materials, self.keys, self.entries, self.moduli)
+        return sum(array.nbytes for array in stored)
 
     @property
     def has_void(self) -> bool:
         """Whether void is one of the materials."""
         return bool(self.materials[0] == 0.0)
-
-
-def _stored(database: Database) -> dict[str, NDArray]:
-    return {name: getattr(database, name) for name in ("keys", "entries", "moduli")}
 
 
 def base_materials(moduli: Moduli, count: int, void: bool = False) -> Array:

@@ -74,7 +74,9 @@ def run(arguments: argparse.Namespace) -> None:
     """Solve, compare, write, and print the errors."""
     with on_ranks():
         require_outputs(arguments)
-        _require_two_files(arguments)
+        names = [arguments.out, arguments.pictures]
+        if None not in names and len({Path(name).resolve() for name in names}) == 1:
+            raise UserError(f"{arguments.out}: is named by --out and by --pictures; name two files")
         described = collect(ProblemOptions, arguments)
         case = rate_coarsening(
             described, arguments.modes, arguments.refine_to, arguments.timed_modes
@@ -88,12 +90,6 @@ def run(arguments: argparse.Namespace) -> None:
         print(json.dumps(case.values, indent=2))
     else:
         _print_errors(case.values)
-
-
-def _require_two_files(arguments: argparse.Namespace) -> None:
-    names = [arguments.out, arguments.pictures]
-    if None not in names and len({Path(name).resolve() for name in names}) == 1:
-        raise UserError(f"{arguments.out}: is named by --out and by --pictures; name two files")
 
 
 def _print_errors(case: dict[str, Any]) -> None:

@@ -23,7 +23,7 @@ from solver.coarsening.forest import FOREST
 from solver.verification.errors import frequency_errors
 from studies.discretisation.lattices import voxel_mesh
 from studies.discretisation.methods import TOLERANCE, Given, TimedSpectrum, Ways
-from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, SolidTruth
+from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, truth_between
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     Returns
     -------
     dict[str, Any]
-        Plain values: `truth`, see `SolidTruth`, and `ways`, see `Ways`: unknowns, seconds, and
+        Plain values: `truth`, see `truth_between`, and `ways`, see `Ways`: unknowns, seconds, and
         errors `against` the `solid` and against its `voxels`.
 
     Raises
@@ -70,8 +70,11 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
         for name, way in ways.named.items():
             found[name].append(_named(name, way))
     left = LEFT_OF_NOISE if options.material in NOISY else LEFT
-    truth = SolidTruth.between(found["cells"][0], ways.cells(FINER), left)
-    truths = {"solid": truth.hertz, "voxels": found["voxels"][0].hertz[RIGID_MODES:]}
+    truth = truth_between(found["cells"][0], ways.cells(FINER), left)
+    truths = {
+        "solid": np.array(truth["frequencies_hz"]),
+        "voxels": found["voxels"][0].hertz[RIGID_MODES:],
+    }
     return {
         "mesh": options.mesh,
         "resolution": options.resolution,
@@ -82,7 +85,7 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
         "tolerance": TOLERANCE,
         "runs": runs,
         **coarsening.record(),
-        "truth": truth.as_dict(),
+        "truth": truth,
         "ways": {name: _described(spectra, truths) for name, spectra in found.items()},
     }
 

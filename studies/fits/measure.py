@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -39,12 +39,8 @@ Enough to keep two units busy that take four cycles each, and few enough for 16 
 """
 
 
-class Rate(NamedTuple):
-    """Items per second: median, minimum and maximum of the runs."""
-
-    median: float
-    minimum: float
-    maximum: float
+Rate = tuple[float, float, float]
+"""Items per second: median, minimum and maximum of the runs."""
 
 
 def _runs(*works: tuple[Callable[[], Any], float]) -> list[list[float]]:
@@ -63,7 +59,7 @@ def _runs(*works: tuple[Callable[[], Any], float]) -> list[list[float]]:
 
 
 def _rate(runs: list[float]) -> Rate:
-    return Rate(float(np.median(runs)), min(runs), max(runs))
+    return float(np.median(runs)), min(runs), max(runs)
 
 
 def _sampled_rate(young: Array, poisson: float) -> Rate:
@@ -93,27 +89,22 @@ def _multiply_in_registers(repetitions: int) -> Array:
     return numbers
 
 
-class Arithmetic(NamedTuple):
-    """Operations of a fit, billions of them per second, and how near that comes to the limits."""
-
-    flops_per_fit: float | None
-    gflops: float | None
-    gflops_dgemm: float
-    gflops_peak: float
-    peak_fraction: float | None
-    dgemm_fraction: float | None
-
-
 def _arithmetic(
     per_fit: float | None, fits: list[float], dgemm: list[float], peak: list[float]
-) -> Arithmetic:
+) -> dict[str, float | None]:
     """From the rates of runs that took turns; of fits whose operations are unknown, the limits."""
-    product, highest = float(np.median(dgemm)), max(peak)
-    if per_fit is None:
-        return Arithmetic(None, None, product, highest, None, None)
-    gflops = 1e-9 * per_fit * float(np.median(fits))
-    share = float(np.median([1e-9 * per_fit * one / other for one, other in zip(fits, dgemm)]))
-    return Arithmetic(per_fit, gflops, product, highest, gflops / highest, share)
+    values: dict[str, float | None] = {
+        **dict.fromkeys(("flops_per_fit", "gflops")),
+        "gflops_dgemm": float(np.median(dgemm)),
+        "gflops_peak": max(peak),
+        **dict.fromkeys(("peak_fraction", "dgemm_fraction")),
+    }
+    if per_fit is not None:
+        gflops = 1e-9 * per_fit * float(np.median(fits))
+        shares = [1e-9 * per_fit * one / other for one, other in zip(fits, dgemm)]
+        values |= {"flops_per_fit": per_fit, "gflops": gflops}
+        values |= {"peak_fraction": gflops / max(peak), "dgemm_fraction": float(np.median(shares))}
+    return values
 
 
 def _flops_per_fit(objective: str, young: Array, poisson: float) -> float | None:
@@ -162,7 +153,7 @@ def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:
     dgemm = partial(_multiply_by_blas, matrix), 2e-9 * MATRIX**3
     peak = partial(_multiply_in_registers, REPETITIONS), 2e-9 * LANES * SUMS * DEPTH * REPETITIONS
     rates: dict[str, Rate] = {}
-    arithmetic: dict[str, Arithmetic] = {}
+    arithmetic: dict[str, dict[str, float | None]] = {}
     for name in track(names, "timing", total=len(names), unit="objective"):
         runs = _runs((partial(fit, name, young, poisson), count), dgemm, peak)
         rates[name] = _rate(runs[0])
@@ -171,18 +162,18 @@ def benchmark(options: FitBenchmarkOptions) -> dict[str, Any]:
     closed, sampled = rates[chosen], _sampled_rate(few, poisson)
     return {
         "objective": chosen,
-        "fits_per_second": {"closed_form": closed.median, "sampled": sampled.median},
+        "fits_per_second": {"closed_form": closed[0], "sampled": sampled[0]},
         "spread": {"closed_form": closed[1:], "sampled": sampled[1:]},
-        "speedup": closed.median / sampled.median,
+        "speedup": closed[0] / sampled[0],
         "rows_per_fit": 8,
         "threads": 1,
         "runs": RUNS,
         "samples": count,
         "samples_of_sampled": len(few),
         "forces_of_sampled": sampled_energy.DIRECTIONS * len(sampled_energy.MAGNITUDES),
-        "objectives": {name: rate.median for name, rate in rates.items()},
-        **arithmetic[chosen]._asdict(),
-        "dgemm_fractions": {name: each.dgemm_fraction for name, each in arithmetic.items()},
+        "objectives": {name: rate[0] for name, rate in rates.items()},
+        **arithmetic[chosen],
+        "dgemm_fractions": {name: each["dgemm_fraction"] for name, each in arithmetic.items()},
         "lanes": LANES,
         "panel": PANEL,
         "compiled_for": compiled_for(),

@@ -19,7 +19,7 @@ from studies.scaling.model import (
     as_far_as_it_fits,
     fit_machine,
 )
-from studies.scaling.work import Request, Work, busiest
+from studies.scaling.work import Work, busiest
 
 PREDICTED = tuple(1 << power for power in range(11))
 """Numbers of ranks that the model is asked for: 1 to 1024."""
@@ -131,7 +131,7 @@ def scaling_study(
 
 
 def _work_of(run: Result) -> Work:
-    return busiest(run["n_dofs"], run["subdomains"], Request.of_run(run), run["ranks"])
+    return busiest(run["n_dofs"], run["subdomains"], run, run["ranks"])
 
 
 def study_lines(result: Result) -> list[str]:
@@ -168,7 +168,7 @@ def _modelled(
     """The model of some runs for numbers of ranks with so many unknowns and subdomains."""
     rows = []
     for ranks, (unknowns, subdomains) in sizes.items():
-        work = busiest(unknowns, subdomains, Request.of_run(runs[0]), ranks)
+        work = busiest(unknowns, subdomains, runs[0], ranks)
         seconds = machine.predict(work)
         row = {"ranks": ranks, "n_dofs": unknowns, "subdomains": subdomains}
         rows.append(row | {"seconds": seconds, "total": sum(seconds.values())})

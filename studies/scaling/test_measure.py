@@ -26,11 +26,11 @@ from studies.scaling.model import (
 )
 from studies.scaling.plot import save_plot
 from studies.scaling.runs import PREDICTED, study_lines
-from studies.scaling.work import Request, busiest
+from studies.scaling.work import busiest
 from tests import solids
 
 BAR = ("builtin:bar", "--resolution", 24, "--material", "smooth")
-REQUEST = Request(keep=60, blocks=2, solves=100, width=70)
+REQUEST = {"keep": 60, "blocks": 2, "right_hand_sides": 100, "width": 70}
 COMPACT = 2.5
 """Factor within which closed forms of compact solids count what a run of a cube does."""
 

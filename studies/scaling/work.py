@@ -8,7 +8,7 @@ s = 3 n^(2/3) unknowns, so that a factorisation takes about 4 s^3 operations and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from math import ceil
 from typing import Any
 
@@ -31,41 +31,20 @@ DENSE_PROBLEMS = 3
 Work = dict[str, Tally]
 
 
-@dataclass(frozen=True)
-class Request:
-    """What is computed, on any number of ranks.
+def busiest(unknowns: float, subdomains: int, run: Mapping[str, Any], ranks: int) -> Work:
+    """Work of the busiest rank in every phase, as tallies without times.
 
-    Attributes
-    ----------
-    keep
-        Modes kept at the root of the merge tree.
-    blocks, solves
-        Blocks of right-hand sides of the correction, and their columns in all.
-    width
-        Modes that it forms.
+    A measured `run` says what is computed on any number of ranks: modes that the root of the merge
+    tree may `keep`, `blocks` of `right_hand_sides` of the correction, modes that it forms (`width`).
     """
-
-    keep: int
-    blocks: int
-    solves: int
-    width: int
-
-    @classmethod
-    def of_run(cls, run: dict[str, Any]) -> Request:
-        """That of a measured run."""
-        return cls(run["keep"], run["blocks"], run["right_hand_sides"], run["width"])
-
-
-def busiest(unknowns: float, subdomains: int, request: Request, ranks: int) -> Work:
-    """Work of the busiest rank in every phase, as tallies without times."""
     leaf, mine = unknowns / subdomains, ceil(subdomains / ranks)
-    modes = [min(modes_to_keep(1.0 / subdomains, request.keep), int(leaf))]
+    modes = [min(modes_to_keep(1.0 / subdomains, run["keep"]), int(leaf))]
     down, merges = Tally(), {}
     for level in range(1, (subdomains - 1).bit_length() + 1):
         groups = max(1.0, subdomains / 2**level)
         root, size = groups == 1.0, 2 * modes[-1]
         child, joined = min(leaf * 2 ** (level - 1), unknowns), min(leaf * 2**level, unknowns)
-        modes.append(min(modes_to_keep(1.0 / groups, request.keep), size))
+        modes.append(min(modes_to_keep(1.0 / groups, run["keep"]), size))
         # Several ranks share a merge, or one has several of them.
         team, each = max(1, int(ranks / groups)), max(1.0, groups / ranks)
         merge = Tally(flops=each * _products(joined, size, 0 if root else modes[-1]) / team)
@@ -76,9 +55,9 @@ def busiest(unknowns: float, subdomains: int, request: Request, ranks: int) -> W
             merge.messages += MERGE_MESSAGES
             merge.bytes += REAL_BYTES * modes[-2] * (min(child, _boundary(child)) + size)
             down.messages += 2
-            down.bytes += REAL_BYTES * modes[-2] * request.keep
+            down.bytes += REAL_BYTES * modes[-2] * run["keep"]
         if not root:
-            down.flops += each * 2.0 * product_flops(modes[-2], modes[-1], request.keep)
+            down.flops += each * 2.0 * product_flops(modes[-2], modes[-1], run["keep"])
         merges[f"merge {level}"] = merge
     down.messages += 2 * (ranks - 1)
     down.bytes += REAL_BYTES * (ranks - 1) * (1 + modes[-1])
@@ -89,7 +68,7 @@ def busiest(unknowns: float, subdomains: int, request: Request, ranks: int) -> W
         **merges,
         "down": down,
         "basis": Tally(flops=mine * product_flops(int(leaf), modes[0], modes[-1]) if merges else 0),
-        **_correction(unknowns, mine * leaf, request, ranks),
+        **_correction(unknowns, mine * leaf, run, ranks),
     }
 
 
@@ -103,18 +82,18 @@ def _products(unknowns: float, size: int, joined: int) -> float:
     return 1.5 * face * size**2 + _boundary(unknowns) * size * joined
 
 
-def _correction(unknowns: float, largest: float, request: Request, ranks: int) -> Work:
+def _correction(unknowns: float, largest: float, run: Mapping[str, Any], ranks: int) -> Work:
     """Work of the block Lanczos iteration, where the busiest rank has `largest` of the unknowns.
 
     The ranks share factorisation, solves, the projection of every block on all before it and the
     modes; the dense problems of the Krylov space are the first rank's.
     """
-    blocks, solves = request.blocks, request.solves
+    blocks, solves = run["blocks"], run["right_hand_sides"]
     columns = solves / max(blocks, 1)
     rounds = (ranks - 1).bit_length()
     separator = 3.0 * (unknowns / 3.0) ** (2.0 / 3.0)
     fronts = [separator * 0.5 ** (2.0 * level / 3.0) for level in range(rounds)]
-    shared = 2.0 * solves**2 + 6.0 * columns * solves + 2.0 * solves * request.width
+    shared = 2.0 * solves**2 + 6.0 * columns * solves + 2.0 * solves * run["width"]
     alone = DENSE_PROBLEMS * eigen_flops(solves, False)
     outside = _boundary(largest) if ranks > 1 else 0.0
     reduced = rounds * solves * (0.5 * solves + 2.0 * columns)
