@@ -35,7 +35,7 @@ def busiest(unknowns: float, subdomains: int, run: Mapping[str, Any], ranks: int
     """Work of the busiest rank in every phase, as tallies without times.
 
     A measured `run` says what is computed on any number of ranks: modes that the root of the merge
-    tree may `keep`, `blocks` of `right_hand_sides` of the correction, modes that it forms (`width`).
+    tree may `keep`, `blocks` of `right_hand_sides` of the correction, its `width` in modes.
     """
     leaf, mine = unknowns / subdomains, ceil(subdomains / ranks)
     modes = [min(modes_to_keep(1.0 / subdomains, run["keep"]), int(leaf))]
