@@ -1,7 +1,5 @@
 """A browser and a server of files for tests of pages (test support)."""
 
-from __future__ import annotations
-
 import functools
 import http.server
 import shutil
@@ -14,8 +12,8 @@ from typing import Any
 import pytest
 
 from tests.patience import PATIENCE_SECONDS
+from tests.programs import CHECKOUT
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
     "--no-sandbox",
@@ -88,8 +86,7 @@ def served(more: Path) -> Iterator[str]:
     """Address of a server of the page's modules, and of files of a folder."""
     handler = type("Files", (_Files,), {"more": more})
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(handler))
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
+    threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
         yield f"http://127.0.0.1:{server.server_port}"
     finally:

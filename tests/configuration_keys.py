@@ -1,7 +1,5 @@
 """Keys of the configuration with the values that they take (test support)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from carillon.parameters.fields import Parameter, ValueDomain, parameters_of

@@ -1,7 +1,5 @@
 """Modal analyses of a search, counted in whatever process they are made (test support)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 

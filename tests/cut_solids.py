@@ -1,7 +1,5 @@
 """Solids that stand askew in their lattice (test support)."""
 
-from __future__ import annotations
-
 import numpy as np
 import trimesh
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """The fits in plain numpy, one block at a time, with dense matrices (test support)."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small free boxes, fine and coarsened, whose frequencies judge a coarsening (test support)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -17,8 +15,7 @@ Coarsen = Callable[[Array], Array]
 def blocks_of(field: Array) -> Array:
     """Moduli (m, 8) of the 2x2x2 blocks of a voxel field (even sizes), x slowest."""
     x, y, z = (n // 2 for n in field.shape)
-    split = field.reshape(x, 2, y, 2, z, 2).transpose(0, 2, 4, 5, 3, 1)
-    return split.reshape(-1, 8)
+    return field.reshape(x, 2, y, 2, z, 2).transpose(0, 2, 4, 5, 3, 1).reshape(-1, 8)
 
 
 def lattice_cells(shape: tuple[int, int, int]) -> np.ndarray:

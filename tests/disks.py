@@ -1,15 +1,14 @@
 """Small file systems, to be full on."""
 
-from __future__ import annotations
-
 import os
 import shutil
-import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+from tests.programs import run
 
 KIB = 1024
 
@@ -28,11 +27,11 @@ def disk_on(folder: Path, size: int) -> Iterator[Callable[[int], None]]:
             folder, f"remount,size={(shutil.disk_usage(folder).used + spare) // KIB}k"
         )
     finally:
-        subprocess.run(["umount", str(folder)], capture_output=True)
+        run("umount", folder)
 
 
 def _mount(folder: Path, options: str) -> None:
     command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = run(*command)
     if done.returncode:
         pytest.skip(f"no file system can be mounted here: {done.stderr}")

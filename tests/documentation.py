@@ -1,7 +1,5 @@
 """The README and the pages of the documentation, and their commands, run as they stand there."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -14,8 +12,8 @@ from typing import NamedTuple
 from carillon.fem.geometry import builtin_surface
 from conftest import MESH_FILES
 from tests.patience import HANG_SECONDS
+from tests.programs import CHECKOUT
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 DOCS = CHECKOUT / "docs"
 PAGES = [CHECKOUT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
@@ -64,8 +62,7 @@ def prose(page: Path) -> str:
 
 def commands(block: Block) -> list[str]:
     """Command lines of a block, continued ones as one line."""
-    lines = re.sub(r" \\\n\s*", " ", block.text).splitlines()
-    return [line for line in lines if line.strip()]
+    return [line for line in re.sub(r" \\\n\s*", " ", block.text).splitlines() if line.strip()]
 
 
 def has_commands(page: Path) -> bool:

@@ -1,7 +1,5 @@
 """The evaluation of forests in plain numpy, written apart from the compiled one (test support)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

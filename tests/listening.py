@@ -1,7 +1,5 @@
 """Where processes listen, as the kernel says; run by ranks, each tells it of itself."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Mesh files made by code: boxes in OBJ and glTF as the formats allow them (test support)."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct
@@ -49,6 +47,13 @@ def soup(surface: trimesh.Trimesh) -> trimesh.Trimesh:
     """The surface with vertices of its own for each face, as in STL."""
     corners = np.asarray(surface.triangles).reshape(-1, 3)
     return trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+
+
+def merged(surface: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The surface with one vertex at each place."""
+    surface = surface.copy()
+    surface.merge_vertices()
+    return surface
 
 
 def saved(surface: trimesh.Trimesh, path: Path) -> str:
@@ -116,3 +121,12 @@ class Gltf:
         start = struct.pack("<4sIII4s", b"glTF", 2, length, len(chunk), b"JSON")
         path.write_bytes(start + chunk + struct.pack("<I4s", len(data), b"BIN\0") + data)
         return str(path)
+
+
+def gltf(surface: trimesh.Trimesh) -> Gltf:
+    """A surface as glTF."""
+    file = Gltf()
+    vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+    file.primitive["attributes"]["POSITION"] = file.accessor(vertices, 5126)
+    file.primitive["indices"] = file.accessor(faces.ravel(), 5125)
+    return file

@@ -1,7 +1,5 @@
 """What several processes of tests need is made by the first of them (test support)."""
 
-from __future__ import annotations
-
 import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager

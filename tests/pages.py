@@ -1,7 +1,5 @@
 """Reading a page as a browser would, and comparing it with the files beside it (test support)."""
 
-from __future__ import annotations
-
 import csv
 import re
 from html.parser import HTMLParser

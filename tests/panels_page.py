@@ -1,7 +1,5 @@
 """The studio's page without a server: playwright answers its requests (test support)."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Iterator, Mapping
@@ -11,12 +9,14 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
+import trimesh
 
 from carillon.parameters.documents import with_defaults
 from carillon.parameters.schema import schema_of
 from sound.project.project import Project
 from studio.binary import pack
 from studio.server.page_files import page_policy
+from tests.studio_stub import clip_entry, solid_entry, state_entry, target_entry
 
 PAGE = Path(__file__).resolve().parent.parent / "studio" / "page"
 ADDRESS = "http://localhost/"
@@ -68,75 +68,30 @@ SILENT = {
 """Modules in place of those that sound and draw: they note in `window.heard` what is asked."""
 
 
-def mode(hertz: float, amplitude: float) -> dict[str, float]:
-    return {"hertz": hertz, "damping_per_second": 8.0, "amplitude": amplitude}
-
-
-def ready_clip(identifier: str = "c1", name: str = "plate.wav") -> dict[str, Any]:
-    return {
-        "clip": identifier,
-        "name": name,
-        "phase": "ready",
-        "message": None,
-        "seconds": 1.25,
-        "rate_hz": 44100,
-        "explained_decibels": 13.6,
-        "says": ["its first 12 ms are left out"],
-        "modes": [mode(hertz, 0.5 / (k + 1)) for k, hertz in enumerate(WANTED.tolist())],
-    }
+def ready_clip() -> dict[str, Any]:
+    return clip_entry("c1", "plate.wav", WANTED, np.full(4, 8.0))
 
 
 def target(name: str, vertex: int, clip: str | None) -> dict[str, Any]:
-    return {
-        "name": name,
-        "vertex": vertex,
-        "position_m": [0.0, 0.0, 0.0],
-        "clip": clip,
-        "modes": None,
-        "allow_clipped": False,
-        "without": [],
-    }
+    return target_entry(name, vertex, clip, [0.0, 0.0, 0.0])
 
 
 def state(**changes: Any) -> dict[str, Any]:
     """A state of two targets, the first one of which has a clip with four modes."""
-    settings = with_defaults({}, Project)
-    made = {
-        "event": "state",
-        "revision": 1,
-        "name": "pan",
-        "saved": True,
-        "workspace": "pans",
-        "undo": None,
-        "redo": None,
-        "solid": {
-            "mesh": "builtin:bell",
-            "name": "bell",
-            "phase": "ready",
-            "progress": None,
-            "message": None,
-            "surface": 3,
-            "vertices": 3,
-            "triangles": 1,
-            "voxels": 11085,
-            "unknowns": 5619,
-            "longest_side_m": 0.1,
-        },
-        "targets": [target("rim", 1, "c1"), target("handle", 2, None)],
-        "clips": [ready_clip()],
-        "wanted": {
-            "hertz": WANTED.tolist(),
-            "dampings_per_second": [8.0] * 4,
-            "amplitudes": [[0.5, 0.25, 0.1, 0.05], [0.1, 0.1, 0.1, 0.1]],
-        },
-        "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
-        "search": {"phase": "idle", "message": None},
-        "fine": {"on": False, "phase": "none", "message": None},
-        "heard": None,
-        "builtins": ["bell"],
-        "examples": [{"project": "e1", "name": "recorded-bell", "says": "a bell"}],
-        "projects": [{"project": "p1", "name": "pan"}],
+    wanted = {
+        "hertz": WANTED.tolist(),
+        "dampings_per_second": [8.0] * 4,
+        "amplitudes": [[0.5, 0.25, 0.1, 0.05], [0.1, 0.1, 0.1, 0.1]],
     }
+    triangle = trimesh.Trimesh(0.1 * np.eye(3), [[0, 1, 2]])
+    made = state_entry(
+        with_defaults({}, Project),
+        name="pan",
+        solid=solid_entry(3, triangle),
+        targets=[target("rim", 1, "c1"), target("handle", 2, None)],
+        clips=[ready_clip()],
+        wanted=wanted,
+    )
     return copy.deepcopy(made) | changes
 
 

@@ -1,7 +1,5 @@
 """How long tests wait: a bound against hangs, never a demand on speed (test support)."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from collections.abc import Callable

@@ -10,8 +10,6 @@ and the plainest one, a sphere of the same surface whose velocity in the directi
 the solid in x.  Takes a minute, then some seconds a mode (with pyopencl; some minutes without).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import dataclass

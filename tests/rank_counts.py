@@ -3,8 +3,6 @@
 Every change needs three: they have shares of unequal size, and one with a neighbour on each side.
 """
 
-from __future__ import annotations
-
 import pytest
 
 TO_THREE = [

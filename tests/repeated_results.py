@@ -3,8 +3,6 @@
 Run again in other circumstances, it tells what the results depend on.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Bowls, bars and bells of several materials fall on a floor, and on each other.  
 kind are computed before the clock starts.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from itertools import product
@@ -43,8 +41,7 @@ def pile(count: int, seconds: float, modes: int, steps: int = 16) -> Scene:
                 "rotation": random.uniform(-180.0, 180.0, 3).tolist(),
             }
         )
-    described = {"objects": objects, "seconds": seconds, "engine": {"steps": steps}}
-    return scene_of(described, Path())
+    return scene_of({"objects": objects, "seconds": seconds, "engine": {"steps": steps}}, Path())
 
 
 def main() -> int:

@@ -1,7 +1,5 @@
 """Scenes for tests: described in few words, played, in pieces (test support)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -46,5 +44,4 @@ def struck(described: Scene) -> tuple[list[Body], list[HertzImpact], list[Sustai
     """Its bodies, impacts, and sustained contacts."""
     bodies, course = moved(described)
     touch = Touch(bodies, described.ground_material)
-    split = split_impacts(course.contacts, touch, described.engine, described.gravity)
-    return bodies, *split
+    return bodies, *split_impacts(course.contacts, touch, described.engine, described.gravity)

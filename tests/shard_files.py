@@ -1,7 +1,5 @@
 """Whole shards written from memory and read into it (test support)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A throw-away SLURM cluster on this machine (test support)."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -14,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.patience import HANG_SECONDS
+from tests.programs import checkout_environment, run
 from tests.workflow_runs import CHECKOUT
 
 SCRIPT = CHECKOUT / "slurm" / "test-cluster.sh"
@@ -53,7 +51,7 @@ class Cluster:
         # Until the node has been told that the jobs are dead, it would kill them again.
         time.sleep(5)
         waiting = ["squeue", "--noheader", "--states=PENDING", "--format=%A"]
-        for job in subprocess.run(waiting, capture_output=True, text=True).stdout.split():
+        for job in run(*waiting).stdout.split():
             subprocess.run(["scontrol", "update", f"JobId={job}", "StartTime=now"], check=True)
 
     def restart_controller(self, pause: float) -> None:
@@ -68,7 +66,7 @@ class Cluster:
     def shorten(self) -> None:
         """Leave the running jobs a minute, counted from their start."""
         running = ["squeue", "--noheader", "--states=RUNNING", "--format=%A"]
-        for job in subprocess.run(running, capture_output=True, text=True).stdout.split():
+        for job in run(*running).stdout.split():
             subprocess.run(["scontrol", "update", f"JobId={job}", "TimeLimit=1"], check=True)
 
     def log(self) -> str:
@@ -83,13 +81,7 @@ class Cluster:
 
 def control(*arguments: object) -> None:
     """Run the cluster's script."""
-    done = subprocess.run(
-        ["bash", str(SCRIPT), *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-        env={**os.environ, "PATH": PLAIN},
-    )
+    done = run("bash", SCRIPT, *arguments, env={**os.environ, "PATH": PLAIN})
     if done.returncode:
         raise RuntimeError(f"{SCRIPT.name} {arguments[0]}: {done.stderr}")
 
@@ -117,7 +109,7 @@ def snakemake(folder: Path, *options: object) -> subprocess.Popen[str]:
         return subprocess.Popen(
             [str(part) for part in (*command, "--profile", PROFILE, *QUICK, *options)],
             cwd=folder,
-            env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+            env=checkout_environment(),
             stdout=log,
             stderr=subprocess.STDOUT,
             text=True,

@@ -3,8 +3,6 @@
 As a program it is any of SLURM's commands, by the name that it is called by.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A design of a small box, made without optimisation (test support)."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

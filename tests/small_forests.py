@@ -1,7 +1,5 @@
 """Forests that are trained within seconds (test support)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

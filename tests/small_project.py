@@ -1,7 +1,5 @@
 """A design problem that takes a second: a bar of few cells whose targets are its own sounds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -45,11 +43,17 @@ def project(folder, **changes):
     return replace(made, optimiser=replace(made.optimiser, **changes))
 
 
+def with_options(problem, **changes):
+    """The design problem with other options of its optimiser."""
+    made = problem.project
+    optimiser = replace(made.optimiser, **changes)
+    return replace(problem, project=replace(made, optimiser=optimiser))
+
+
 def smooth_fields(grid):
     """Nine smooth functions (m, 9) of the cells' places, of mean 0 and root mean square 1."""
     x, y, z = (2.0 * (grid - grid.mean(axis=0)) / np.ptp(grid, axis=0)).T
-    along = legendre.legvander(x, 4)[:, 1:]
-    fields = np.column_stack([along, y, z, x * y, x * z, y * z])
+    fields = np.column_stack([legendre.legvander(x, 4)[:, 1:], y, z, x * y, x * z, y * z])
     fields -= fields.mean(axis=0)
     return fields / np.sqrt((fields**2).mean(axis=0))
 

@@ -1,17 +1,20 @@
 """Small solids and reference solutions that the solver's tests share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
+from mpi4py import MPI
 from numpy.polynomial import legendre
 
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import HexMesh, blocks_from_mesh, hexmesh_from_grid
 from carillon.fem.model import ElasticModel, Solid, fine_model
+from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modes import Modes
+from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
 from solver.assembly.system import System
 from solver.coarsening.choice import make_coarsening
@@ -83,6 +86,11 @@ def dense_eigenvalues(model: Solid) -> np.ndarray:
     return la.eigh(K.toarray(), M.toarray(), eigvals_only=True)
 
 
+def analysed(model: Solid, **options: Any) -> Modes:
+    """Modes of a model on this rank, by these of the solver's options."""
+    return modal_analysis(model, SolverOptions(**options), MPI.COMM_SELF)
+
+
 def timoshenko_free_frequencies(
     length: float, side: float, young: float, poisson: float, density: float, count: int
 ) -> np.ndarray:
@@ -122,5 +130,4 @@ def timoshenko_free_frequencies(
             [zero, density * inertia * form(values, values)],
         ]
     )
-    values_ = la.eigh(K, M, eigvals_only=True)
-    return np.sqrt(values_[2 : 2 + count]) / (2.0 * np.pi)
+    return np.sqrt(la.eigh(K, M, eigvals_only=True)[2 : 2 + count]) / (2.0 * np.pi)

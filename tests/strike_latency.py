@@ -8,8 +8,6 @@ with a made-up solid, where the pointerdown is on its view.  What comes after, i
 system, is what the browser says of it.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from pathlib import Path

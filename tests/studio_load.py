@@ -5,8 +5,6 @@
 A real studio is opened with an example whose material is sought meanwhile.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

@@ -1,22 +1,18 @@
 """The studio's page in a browser, on a studio that is made up (test support)."""
 
-from __future__ import annotations
-
-import asyncio
-import threading
+import importlib.util
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import trimesh
-import uvicorn
 
-from studio.server.app import make_app
-from studio.server.guard import Keys
-from studio.server.serve import address_of, listen
 from tests.patience import PATIENCE_SECONDS
+from tests.studio_server import served
 from tests.studio_stub import StubStudio
 
 TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
@@ -25,11 +21,13 @@ TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimation
 class ToldStudio(StubStudio):
     """A made-up studio whose state a test may tell otherwise, and which may hold another solid."""
 
+    soon: Callable[..., None]
+    """Calls a function in the server's thread, and waits for that."""
+
     def __init__(self, mesh: trimesh.Trimesh | None = None) -> None:
         super().__init__()
         self.told: dict[str, Any] = {}
         self._first = dict(self._targets[0])
-        self.loop: asyncio.AbstractEventLoop | None = None
         if mesh is not None:
             self._mesh = mesh
             self._inward = -np.array(mesh.vertex_normals)
@@ -58,42 +56,13 @@ class ToldStudio(StubStudio):
         self._away = away
         self.soon(self.changed)
 
-    def soon(self, function: Any) -> None:
-        """Call a function in the server's thread, and wait for that."""
-        assert self.loop is not None
-        done = threading.Event()
-        self.loop.call_soon_threadsafe(lambda: (function(), done.set()))
-        assert done.wait(PATIENCE_SECONDS)
-
 
 @contextmanager
-def serving(studio: ToldStudio, port: int = 0) -> Iterator[str]:
+def serving(studio: ToldStudio, port: int | None = None) -> Iterator[str]:
     """Address of the studio's page, with its token."""
-    listener, keys = listen("127.0.0.1", port), Keys()
-    address = address_of(listener, "127.0.0.1")
-    app = make_app(studio, keys, "127.0.0.1", listener.getsockname()[1])
-    server = uvicorn.Server(
-        uvicorn.Config(
-            app,
-            ws="websockets-sansio",
-            lifespan="off",
-            log_config=None,
-            timeout_graceful_shutdown=1,
-        )
-    )
-
-    async def run() -> None:
-        studio.loop = asyncio.get_running_loop()
-        await server.serve([listener])
-
-    thread = threading.Thread(target=lambda: asyncio.run(run()), daemon=True)
-    thread.start()
-    try:
-        until(lambda: server.started)
-        yield f"{address}?token={keys.token}"
-    finally:
-        server.should_exit = True
-        thread.join(PATIENCE_SECONDS)
+    with served(studio=studio, port=port) as server:
+        studio.soon = server.soon
+        yield f"{server.origin}/?token={server.keys.token}"
 
 
 def until(asked: Any, seconds: float = PATIENCE_SECONDS) -> Any:
@@ -120,6 +89,20 @@ def until_still(page: Any) -> None:
     """Wait until what lies over the solid has its place, and nothing is drawn any more."""
     page.evaluate(TWO_FRAMES)
     until_page(page, "!studio.view.drawing?.waiting")
+
+
+def axe_finds(page: Any, impacts: Collection[str | None] = ("serious", "critical")) -> list[str]:
+    """What axe finds wrong with a page as it is; skips the test where axe is not installed."""
+    package = importlib.util.find_spec("axe_playwright_python")
+    if package is None or package.origin is None:
+        pytest.skip("axe-playwright-python is not installed")
+    page.evaluate((Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
+    return [
+        f"{each['id']}: {[node['html'] for node in each['nodes']]}"
+        for each in found
+        if each["impact"] in impacts
+    ]
 
 
 SPY = """() => {

@@ -5,8 +5,6 @@
 A real studio is opened with an example whose material is sought.
 """
 
-from __future__ import annotations
-
 import io
 import sys
 import tempfile

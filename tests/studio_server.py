@@ -1,7 +1,5 @@
 """A served studio and somebody who asks it, byte by byte if need be (test support)."""
 
-from __future__ import annotations
-
 import asyncio
 import http.client
 import json
@@ -21,6 +19,8 @@ from studio.server.serve import listen, make_server, serve_and_close
 from studio.server.uploads import Limits
 from tests.studio_stub import StubStudio
 
+ROUTES = ("/", "/page/main.js", "/schema.json", "/surface/1", "/clip/c1/sound", "/export/h5")
+"""One of each kind that can be asked for by GET."""
 SECONDS = 20.0
 """Longest wait for an answer."""
 
@@ -100,6 +100,11 @@ class Served:
     def upload(self, kind: str, name: str, content: bytes) -> Answer:
         return self.ask(f"/{kind}?name={quote(name, safe='')}", "POST", content)
 
+    def posting(self, kind: str, rest: str) -> bytes:
+        """A request of the page's to upload something, whose other headers are the rest."""
+        head = f"POST /{kind} HTTP/1.1\r\nHost: {self.host}\r\nCookie: {self.cookie}\r\n"
+        return f"{head}Origin: {self.origin}\r\n{rest}".encode()
+
     def raw(self, request: bytes) -> bytes:
         """What comes back on bytes of one's own making, until the server closes."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=SECONDS) as stream:
@@ -137,10 +142,12 @@ def served(
     limits: Limits | None = None,
     host: str = "127.0.0.1",
     connections: Connections | None = None,
+    studio: StubStudio | None = None,
+    port: int | None = None,
 ) -> Iterator[Served]:
     """A made-up studio, served by a thread."""
-    studio, keys, limits = StubStudio(), Keys(), limits or Limits()
-    with listen(host, None) as listener:
+    studio, keys, limits = studio or StubStudio(), Keys(), limits or Limits()
+    with listen(host, port) as listener:
         port = listener.getsockname()[1]
         server = make_server(studio, listener, host, keys, limits, connections)
         loop = asyncio.new_event_loop()

@@ -3,8 +3,6 @@
 `python -m tests.studio_stub [--port N]` serves the page with it.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import io
@@ -15,6 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
@@ -30,6 +29,69 @@ STEP_SECONDS = 0.2
 """Between two improvements of the made-up search."""
 WANTED = 523.25 * np.array([1.0, 1.5, 2.0, 2.4, 3.0, 4.0, 5.2, 6.7])
 """Frequencies of the clip [Hz]."""
+
+
+def clip_entry(
+    identifier: str, name: str, hertz: np.ndarray, dampings: np.ndarray
+) -> dict[str, Any]:
+    """A clip as the page is told of it, each of whose modes is fainter than that before."""
+    modes = [
+        {"hertz": each, "damping_per_second": damping, "amplitude": 0.5 / (k + 1)}
+        for k, (each, damping) in enumerate(zip(hertz.tolist(), dampings.tolist()))
+    ]
+    return {
+        "clip": identifier,
+        "name": name,
+        "phase": "ready",
+        "message": None,
+        "seconds": 1.2,
+        "rate_hz": 44100,
+        "explained_decibels": 13.6,
+        "says": ["its first 12 ms are left out"],
+        "modes": modes,
+    }
+
+
+def target_entry(name: str, vertex: int, clip: str | None, position: list[float]) -> dict[str, Any]:
+    place = {"name": name, "vertex": vertex, "position_m": position}
+    return {**place, "clip": clip, "modes": None, "allow_clipped": False, "without": []}
+
+
+def solid_entry(surface: int, mesh: trimesh.Trimesh) -> dict[str, Any]:
+    """A bell that is ready, whatever its mesh is."""
+    return {
+        "mesh": "builtin:bell",
+        "name": "bell",
+        "phase": "ready",
+        "progress": None,
+        "message": None,
+        "surface": surface,
+        "vertices": len(mesh.vertices),
+        "triangles": len(mesh.faces),
+        "voxels": 11085,
+        "unknowns": 5619,
+        "longest_side_m": float(mesh.extents.max()),
+    }
+
+
+def state_entry(settings: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
+    """A state of a studio in which nothing is going on."""
+    return {
+        "event": "state",
+        "revision": 1,
+        "saved": True,
+        "workspace": "stub",
+        "undo": None,
+        "redo": None,
+        "settings": {k: v for k, v in settings.items() if k not in SIDES},
+        "search": {"phase": "idle", "message": None},
+        "fine": {"on": False, "phase": "none", "message": None},
+        "heard": None,
+        "builtins": ["bell", "frying-pan"],
+        "examples": [{"project": "e1", "name": "recorded-bell", "says": "made up"}],
+        "projects": [{"project": "p1", "name": "pan"}],
+        **changes,
+    }
 
 
 class StubStudio:
@@ -58,75 +120,29 @@ class StubStudio:
         pass
 
     def _clip(self, identifier: str, name: str) -> dict[str, Any]:
-        modes = [
-            {"hertz": hertz, "damping_per_second": 3.0 + k, "amplitude": 0.5 / (k + 1)}
-            for k, hertz in enumerate(WANTED.tolist())
-        ]
-        return {
-            "clip": identifier,
-            "name": name,
-            "phase": "ready",
-            "message": None,
-            "seconds": 1.2,
-            "rate_hz": 44100,
-            "explained_decibels": 13.6,
-            "says": ["eight modes, made up"],
-            "modes": modes,
-        }
+        return clip_entry(identifier, name, WANTED, 3.0 + np.arange(len(WANTED)))
 
     def _add(self, vertex: int, name: str, clip: str | None) -> None:
-        self._targets.append(
-            {
-                "name": name,
-                "vertex": vertex,
-                "position_m": self._mesh.vertices[vertex].tolist(),
-                "clip": clip,
-                "modes": None,
-                "allow_clipped": False,
-                "without": [],
-            }
-        )
+        self._targets.append(target_entry(name, vertex, clip, self._mesh.vertices[vertex].tolist()))
 
     def state(self) -> dict[str, Any]:
         clips = [each for each in self._targets if each["clip"] is not None]
-        return {
-            "event": "state",
-            "revision": self._revision,
-            "name": "stub",
-            "saved": True,
-            "workspace": "stub",
-            "undo": None,
-            "redo": None,
-            "solid": {
-                "mesh": "builtin:bell",
-                "name": "bell",
-                "phase": "ready",
-                "progress": None,
-                "message": None,
-                "surface": 1,
-                "vertices": len(self._mesh.vertices),
-                "triangles": len(self._mesh.faces),
-                "voxels": 11085,
-                "unknowns": 5619,
-                "longest_side_m": float(self._mesh.extents.max()),
-            },
-            "targets": self._targets,
-            "clips": self._clips,
-            "wanted": {
-                "hertz": WANTED.tolist(),
-                "dampings_per_second": (3.0 + np.arange(len(WANTED))).tolist(),
-                "amplitudes": [(0.5 / (1 + np.arange(len(WANTED)))).tolist() for _ in clips],
-            }
-            if clips
-            else None,
-            "settings": {k: v for k, v in self._settings.items() if k not in SIDES},
-            "search": {"phase": self._phase, "message": None},
-            "fine": {"on": False, "phase": "none", "message": None},
-            "heard": self._heard,
-            "builtins": ["bell", "frying-pan"],
-            "examples": [{"project": "e1", "name": "recorded-bell", "says": "made up"}],
-            "projects": [{"project": "p1", "name": "pan"}],
+        wanted = {
+            "hertz": WANTED.tolist(),
+            "dampings_per_second": (3.0 + np.arange(len(WANTED))).tolist(),
+            "amplitudes": [(0.5 / (1 + np.arange(len(WANTED)))).tolist() for _ in clips],
         }
+        return state_entry(
+            revision=self._revision,
+            name="stub",
+            solid=solid_entry(1, self._mesh),
+            targets=self._targets,
+            clips=self._clips,
+            wanted=wanted if clips else None,
+            settings=self._settings,
+            search={"phase": self._phase, "message": None},
+            heard=self._heard,
+        )
 
     def bank(self) -> bytes:
         """The bank of the present material."""

@@ -1,11 +1,5 @@
 """The public surface, `import carillon as ca`: whole, light, and the same as what it stands on."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
-from pathlib import Path
-
 import h5py
 import meshio
 import numpy as np
@@ -14,8 +8,7 @@ import pytest
 import carillon as ca
 from carillon import api
 from carillon.fem.geometry import HexMesh
-
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT, python
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +25,7 @@ def test_all_names_are_there_and_documented():
 
 def test_import_loads_no_room_and_no_numpy():
     program = "import sys, carillon as ca; ca.UserError; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = python("-c", program)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
     assert loaded.isdisjoint({"numpy", "mpi4py", "petsc4py", "numba", "solver", "sound", "forests"})
 
@@ -113,8 +106,7 @@ def test_two_strikes_are_the_sum_of_each(bar):
     first, second = (ca.render(bar, each, seconds=0.4) for each in at)
     delay = round(0.1 * api.SAMPLE_RATE)
     basis = np.stack([first, np.concatenate([np.zeros(delay), second[:-delay]])])
-    shares = np.linalg.lstsq(basis.T, both, rcond=None)
-    assert shares[1][0] < 1e-12 * both @ both
+    assert np.linalg.lstsq(basis.T, both, rcond=None)[1][0] < 1e-12 * both @ both
 
 
 def test_a_point_or_a_target_is_needed(bar):
@@ -159,6 +151,5 @@ def test_ranks_solve_together(tmp_path, bar, mpiexec):
         f"found.save({str(tmp_path / 'bar.h5')!r})\n"
         "print(len(found.frequencies))\n"
     )
-    done = mpiexec(2, script, check=True)
-    assert done.stdout.split() == ["12", "12"]
+    assert mpiexec(2, script, check=True).stdout.split() == ["12", "12"]
     assert ca.compare(ca.read(tmp_path / "bar.h5"), bar).eigenvalue_relative_error["max"] < 1e-6

@@ -1,7 +1,5 @@
 """Voxels that close a gap of a solid, and so hold together what is apart, are told."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,20 +1,17 @@
 """Programs that are started end with whoever started them, also if that is killed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures.process import BrokenProcessPool
-from pathlib import Path
+from contextlib import closing
 
 import pytest
 
 from carillon.processes.children import ProcessPool, run_child
-
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT
 
 HOLDING = """
 import signal, sys
@@ -73,11 +70,8 @@ def begun_and_yielded(pool, window):
 
 
 def test_results_come_in_order_and_no_more_than_a_window_is_begun():
-    pool = ProcessPool(2)
-    try:
+    with closing(ProcessPool(2)) as pool:
         assert begun_and_yielded(pool, 8) == (8, list(range(30)))
-    finally:
-        pool.close()
 
 
 def signals_and_ranks(_):
@@ -87,11 +81,8 @@ def signals_and_ranks(_):
 
 def test_processes_hear_no_signal_to_stop_and_are_no_ranks(monkeypatch):
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
-    pool = ProcessPool(1)
-    try:
+    with closing(ProcessPool(1)) as pool:
         assert pool.submit(signals_and_ranks, None).result() == (True, None)
-    finally:
-        pool.close()
     assert os.environ["OMPI_COMM_WORLD_RANK"] == "1"
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
 
@@ -107,13 +98,10 @@ def test_a_program_started_where_signals_are_held_still_ends_with_its_parent():
 
 @pytest.mark.parametrize("code", [7, -9])
 def test_a_process_that_dies_is_told_by_its_code(code):
-    pool = ProcessPool(2)
-    try:
+    with closing(ProcessPool(2)) as pool:
         with pytest.raises(BrokenProcessPool):
             pool.submit(die, code).result()
         assert pool.failure() == code
-    finally:
-        pool.close()
 
 
 def die(code):

@@ -1,12 +1,9 @@
 """However a program ends, it says so in one sentence, and no rank is left waiting."""
 
-from __future__ import annotations
-
 import errno
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,9 +16,8 @@ from carillon.command_line.arguments import Parser
 from carillon.command_line.commands import run_program
 from carillon.errors import ConvergenceError, UserError, on_all_ranks
 from carillon.fem.geometry.builtin import builtin_surface
+from tests.programs import CHECKOUT, run
 from tests.rank_counts import SEVERAL
-
-CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 class Ranks:
@@ -108,23 +104,15 @@ def test_abbreviated_options_and_values_that_look_like_options_are_taken():
     assert (found.resolution, found.words) == ("8", ["--resoluton"])
 
 
-def too_much():
-    np.empty(1 << 60, dtype=np.uint8)
-
-
 @pytest.mark.parametrize(
     ("main", "status", "said"),
     [
         (raising(UserError("no such\nmesh")), 2, "no such mesh"),
         (raising(ConvergenceError("missed")), 3, "missed"),
         (raising(MemoryError()), 2, "out of memory; ask for"),
-        (too_much, 2, "out of memory (Unable to allocate 1.00 EiB"),
+        (lambda: np.empty(1 << 60, np.uint8), 2, "out of memory (Unable to allocate 1.00 EiB"),
         (raising(OSError(errno.ENOSPC, "?")), 2, "No space left on device; make room"),
-        (
-            raising(PermissionError(errno.EACCES, "Permission denied", "a.h5")),
-            2,
-            "a.h5: Permission",
-        ),
+        (raising(PermissionError(errno.EACCES, "Permission", "a.h5")), 2, "a.h5: Permission"),
         (raising(BrokenPipeError(errno.EPIPE, "Broken pipe")), 2, "Broken pipe"),
         (raising(KeyboardInterrupt()), 130, "interrupted"),
     ],
@@ -143,8 +131,7 @@ def test_a_fault_of_the_program_keeps_its_traceback():
 def test_what_all_ranks_raise_is_told_by_the_first_and_aborts_nothing(capsys):
     for rank in range(3):
         ranks = Ranks(rank, 3)
-        main = on_all_ranks()(raising(UserError("bad")))
-        assert exit_status.run("program", main, ranks) == 2
+        assert exit_status.run("program", on_all_ranks()(raising(UserError("bad"))), ranks) == 2
         assert ranks.aborted is None
     assert capsys.readouterr().err == "program: bad\n"
 
@@ -214,12 +201,7 @@ sys.exit(exit_status.run("program", main))
 def run_shell(redirection, tmp_path, words=1):
     out = tmp_path / "out"
     command = f'"$0" -c "$1" {out} {words} {redirection}'
-    return subprocess.run(
-        ["bash", "-c", command, sys.executable, PROGRAM],
-        cwd=CHECKOUT,
-        capture_output=True,
-        text=True,
-    ), out.read_text()
+    return run("bash", "-c", command, sys.executable, PROGRAM, cwd=CHECKOUT), out.read_text()
 
 
 @pytest.mark.parametrize("words", [1, 100_000])
@@ -258,5 +240,4 @@ def test_complaints_that_nobody_takes_change_no_status(tmp_path):
     command += (
         'def main(): raise UserError(1)\nraise SystemExit(exit_status.run(1, main))" 2> /dev/full'
     )
-    done = subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT)
-    assert done.returncode == 2
+    assert subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT).returncode == 2

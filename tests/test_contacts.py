@@ -1,7 +1,5 @@
 """Bodies that touch along edges or in points alone are no solid, however the lattice lies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -12,7 +10,7 @@ from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import voxelize
 from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS, builtin_surface
 from carillon.fem.geometry.contacts import one_body
-from tests.mesh_files import block, concatenated, inside_out, soup
+from tests.mesh_files import block, concatenated, inside_out, merged, soup
 
 CUBE = block((0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 TURN = trimesh.transformations.rotation_matrix(0.7, (1.0, 2.0, 3.0))
@@ -66,8 +64,7 @@ def test_bodies_are_one_if_they_share_an_area_or_overlap(name, turn, form):
     with pytest.raises(UserError, match="2 pieces that touch along an edge or in a point at most"):
         one_body(surface, "error", "it")
     kept = one_body(surface, "largest", "it")
-    largest = max(CUBE.volume, other.volume)
-    assert kept.volume == pytest.approx(largest)
+    assert kept.volume == pytest.approx(max(CUBE.volume, other.volume))
 
 
 @pytest.mark.parametrize("resolution", [10, 15, 16])
@@ -90,8 +87,7 @@ def test_the_largest_of_bodies_that_touch_lies_where_it_did():
 
 
 def test_bodies_that_a_third_one_joins_are_one():
-    bridge = block((0.08, 0.08, 0.02), (0.12, 0.12, 0.08))
-    surface = concatenated(CUBE, APART["edge"], bridge)
+    surface = concatenated(CUBE, APART["edge"], block((0.08, 0.08, 0.02), (0.12, 0.12, 0.08)))
     assert one_body(surface, "error", "it") is surface
 
 
@@ -111,16 +107,8 @@ def united(places: list[tuple[int, int]], edge: float = 0.1) -> trimesh.Trimesh:
     middles = np.round(whole.triangles_center / edge, 6)
     outward = np.round(whole.face_normals)
     sides = {tuple(row) for row in np.column_stack([middles, outward])}
-    kept = [(*at, *-out) not in sides for at, out in zip(middles, outward)]
-    whole.update_faces(np.array(kept))
+    whole.update_faces(np.array([(*at, *-out) not in sides for at, out in zip(middles, outward)]))
     return whole
-
-
-def merged(surface: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The surface with one vertex at each place."""
-    surface = surface.copy()
-    surface.merge_vertices()
-    return surface
 
 
 C = united(SEVEN)
@@ -166,8 +154,7 @@ def test_a_body_that_touches_itself_along_an_edge_is_warned_of(name, turn, caplo
 
 
 def test_the_place_of_the_longest_edge_is_said(caplog):
-    surface = united(SEVEN)
-    assert "along an edge at (0.2, 0.2, 0.05) m" in warnings_of(surface, caplog)[0]
+    assert "along an edge at (0.2, 0.2, 0.05) m" in warnings_of(united(SEVEN), caplog)[0]
     relief = united([(x, y) for x in range(41) for y in range(41) if (x + y) % 2 == 0], 0.01)
     assert "along 1,000 edges or more, the longest at (" in warnings_of(relief, caplog)[0]
 

@@ -62,8 +62,7 @@ def test_inspect_counts_what_is_there(tmp_path, capsys):
 def test_inspect_does_not_depend_on_the_pieces(tmp_path, monkeypatch):
     write_shard(tmp_path / "a.h5", generate(ShardOptions(3000, 7), progress=False))
     whole = summary.describe(tmp_path / "a.h5")
-    pieces = partial(iterate_shard, rows=170)
-    monkeypatch.setattr(summary, "iterate_shard", pieces)
+    monkeypatch.setattr(summary, "iterate_shard", partial(iterate_shard, rows=170))
     assert summary.describe(tmp_path / "a.h5") == whole
 
 
@@ -131,43 +130,3 @@ def test_benchmark_of_one_objective_as_text_and_iterative_without_operations(cap
     found = json.loads(capsys.readouterr().out)
     assert list(found["objectives"]) == ["energy"] and found["objective"] == "energy"
     assert found["flops_per_fit"] is None and found["peak_fraction"] is None
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        (),
-        ("generate", "--out", "a.h5"),
-        ("generate", "--samples", "many", "--out", "a.h5"),
-        ("generate", "--samples", "0", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--seed", "-1", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--shard", "2", "--shards", "2", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--objective", "best", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--poisson", "0.5", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--workers", "0", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--distribution", "normal", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--low", "10", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--low", "-1", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--low", "nan", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--high", "inf", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--distribution", "log-uniform", "--low", "0")
-        + ("--out", "a.h5"),
-        ("generate", "--samples", "9", "--seed", str(1 << 64), "--out", "a.h5"),
-        ("generate", "--samples", "9", "--out", "missing/a.h5"),
-        ("generate", "--samples", str(10**18), "--out", "a.h5"),
-        ("generate", "--samples", str(2**63), "--shards", str(2**62), "--out", "a.h5"),
-        ("generate", "--samples", "9", "--workers", str(10**6), "--out", "a.h5"),
-        ("generate", "--samples", "9", "--high", "1e300", "--out", "a.h5"),
-        ("generate", "--samples", "9", "--out", "/dev/null"),
-        ("inspect", "missing.h5"),
-        ("benchmark", "--samples", "0"),
-        ("benchmark", "--samples", str(10**12)),
-        ("benchmark", "--objective", "best"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_2(arguments, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert run(*arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == "" and len(captured.err.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []

@@ -1,7 +1,5 @@
 """A shard under way: killed, resumed, locked, out of disk, and what is there already."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import json
@@ -27,9 +25,9 @@ from dataset_gen.shards import origin_of
 from dataset_gen.tasks import ROW, ShardPlan
 from dataset_gen.workers import in_this_process
 from tests.patience import HANG_SECONDS, wait_for
+from tests.programs import checkout_environment
 from tests.shard_files import read_shard
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 SAMPLES, TASK = 3000, 128
 
 
@@ -180,7 +178,7 @@ def start(path, program):
 
     def start(workers=1, seconds=0.05, **options):
         command = [sys.executable, program, path, workers, seconds]
-        environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+        environment = checkout_environment()
         process = subprocess.Popen(
             [str(part) for part in command],
             env=environment,
@@ -251,8 +249,7 @@ def test_a_worker_that_dies_is_told_in_a_sentence(path, monkeypatch):
         results = engine_of(2)(plan, tasks)
         yield next(results)
         for child in children(os.getpid()):
-            command = Path(f"/proc/{child}/cmdline").read_text()
-            if "spawn_main" in command and not killed:
+            if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text() and not killed:
                 os.kill(child, signal.SIGKILL)
                 killed.append(child)
         yield from results

@@ -44,8 +44,7 @@ def in_lanes(array):
 
 
 def random_blocks(mask, count, seed=0):
-    generator = np.random.default_rng(seed)
-    return generator.uniform(0.1, 10, (count, 8)) * (mask >> np.arange(8) & 1)
+    return np.random.default_rng(seed).uniform(0.1, 10, (count, 8)) * (mask >> np.arange(8) & 1)
 
 
 @pytest.mark.parametrize("mask", CLASSES)
@@ -54,8 +53,7 @@ def test_elimination_has_every_active_node_once_and_all_fill(mask):
     cells = np.flatnonzero(mask >> np.arange(8) & 1)
     assert sorted(elimination.dofs[::3] // 3) == sorted(np.unique(CELL_NODES[cells]))
     nodes = len(elimination.linked)
-    generator = np.random.default_rng(0)
-    matrix = elimination.linked * generator.uniform(-1, 1, (nodes, nodes))
+    matrix = elimination.linked * np.random.default_rng(0).uniform(-1, 1, (nodes, nodes))
     matrix = matrix + matrix.T + 4 * nodes * np.eye(nodes)
     occupied = np.linalg.cholesky(matrix) != 0
     np.testing.assert_array_equal(np.tril(elimination.filled), occupied)
@@ -145,8 +143,7 @@ def sampled(mask, young):
 @pytest.mark.parametrize("objective", [closed_form, sampled])
 @pytest.mark.parametrize("mask", [255, 0b00010111])
 def test_gradient_and_hessian_are_those_of_central_differences(objective, mask):
-    young = np.repeat(random_blocks(mask, 1), LANES, axis=0)
-    evaluate = objective(mask, young)
+    evaluate = objective(mask, np.repeat(random_blocks(mask, 1), LANES, axis=0))
     logs = np.log(np.random.default_rng(6).uniform(0.5, 5, 8))
     _, gradient, hessian = derivatives(evaluate, logs)
     steps = 1e-5 * np.eye(8)

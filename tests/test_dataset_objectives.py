@@ -55,8 +55,7 @@ def test_fit_follows_the_symmetries_of_the_cube(objective, blocks):
 
 @EVERY
 def test_every_void_pattern_has_positive_bounded_moduli(objective):
-    young = every_pattern()
-    fits = fit(objective, young)
+    fits = fit(objective, every_pattern())
     # Two fits multiplied reach the square of the floor.
     assert (fits.moduli >= MODULUS_FLOOR**2).all()
     assert (fits.moduli <= 15.0).all()
@@ -67,8 +66,7 @@ def test_every_void_pattern_has_positive_bounded_moduli(objective):
 @EVERY
 def test_a_row_does_not_depend_on_its_company(objective, blocks):
     together = fit(objective, blocks)
-    alone = [fit(objective, block[None]) for block in blocks]
-    for whole, parts in zip(together, zip(*alone)):
+    for whole, parts in zip(together, zip(*[fit(objective, block[None]) for block in blocks])):
         np.testing.assert_array_equal(whole, np.concatenate(parts))
     backwards = fit(objective, np.repeat(blocks, 3, axis=0)[::-1]).moduli
     np.testing.assert_array_equal(backwards[::-1][::3], together.moduli)
@@ -155,8 +153,7 @@ def test_energy_is_stationary_in_the_closed_form(blocks):
 def test_energy_that_runs_out_of_steps_says_so(blocks, monkeypatch):
     """The flag of the compiled loop, shown by its plain Python twin with a single step."""
     compiled_loop = energy._fit_rows
-    namespace = compiled_loop.py_func.__globals__
-    monkeypatch.setitem(namespace, "MAX_ITERATIONS", 1)
+    monkeypatch.setitem(compiled_loop.py_func.__globals__, "MAX_ITERATIONS", 1)
     short = numba.njit(compiled_loop.py_func)
     young = np.random.default_rng(8).uniform(1, 10, (3, 8)) / 10
     starts = np.log(young)
@@ -175,15 +172,13 @@ def test_sampled_energy_converges_to_its_closed_form(mask):
     gaussian = pattern.without_null(generator.standard_normal((len(pattern.dofs), 200_000)))
     squares = reference.energy_differences(moduli, young, gaussian, 0.25) ** 2
     for count in (2_000, 20_000, 200_000):
-        error = abs(squares[:count].mean() - expected)
-        assert error < 5 * squares.std() / np.sqrt(count)
+        assert abs(squares[:count].mean() - expected) < 5 * squares.std() / np.sqrt(count)
 
 
 @pytest.mark.parametrize("mask", [255, 0b00011111])
 def test_sampled_fit_sums_what_the_paper_prints(mask):
     """The residual is that of all directions at all magnitudes, and the minimum is one."""
-    generator = np.random.default_rng(6)
-    young = generator.uniform(1, 10, 8) * (mask >> np.arange(8) & 1)
+    young = np.random.default_rng(6).uniform(1, 10, 8) * (mask >> np.arange(8) & 1)
     found = sampled_energy.fit_block(young, np.random.default_rng(1), 0.25, 300)
     unit = sampled_energy.draw_forces(young, 300, np.random.default_rng(1))
     forces = np.concatenate([size * unit for size in sampled_energy.MAGNITUDES], axis=1)

@@ -1,7 +1,5 @@
 """One shard on several MPI ranks: the same bytes, and no rank left waiting after an error."""
 
-from __future__ import annotations
-
 import pytest
 
 from dataset_gen.generate import generate_file
@@ -89,8 +87,7 @@ def test_an_error_on_one_rank_ends_all_and_what_was_done_is_kept(
     rank, path, program, reference, mpiexec
 ):
     # Beyond the window, so that some tasks are in the journal by then.
-    failing = str(tuple((rank, task) for task in range(13, 24)))
-    done = mpiexec(3, program(failing), *options(path))
+    done = mpiexec(3, program(str(tuple((rank, task) for task in range(13, 24)))), *options(path))
     assert done.returncode == 2
     assert sentences(done) == ["dataset_gen generate: planted"]
     assert journal_of(path).stat().st_size > TASK * 137 and not path.exists()

@@ -13,7 +13,7 @@ from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import iterate_shard, read_settings
-from tests.edited_files import edited
+from tests.edited_files import edited, put
 from tests.shard_files import read_shard, read_shards, write_shard
 
 COLUMNS = ("fine", "coarse", "residual", "converged")
@@ -96,19 +96,6 @@ def test_interrupted_write_leaves_nothing(tmp_path, shard, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def edit(path, change):
-    with edited(path) as file:
-        change(file)
-
-
-def replace_column(name, values):
-    def change(file):
-        del file[name]
-        file[name] = values
-
-    return change
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -118,13 +105,14 @@ def replace_column(name, values):
         (lambda file: file.attrs.create("seed", "many"), "settings"),
         (lambda file: file.pop("coarse"), "'coarse'"),
         (lambda file: file.attrs.modify("stop", 299), "expected (299, 8)"),
-        (replace_column("coarse", np.full((300, 8), np.nan)), "out of range"),
-        (replace_column("coarse", np.zeros((300, 8))), "out of range"),
-        (replace_column("fine", np.zeros((300, 8))), "out of range"),
+        (put("coarse", lambda _: np.full((300, 8), np.nan)), "out of range"),
+        (put("coarse", lambda _: np.zeros((300, 8))), "out of range"),
+        (put("fine", lambda _: np.zeros((300, 8))), "out of range"),
     ],
 )
 def test_unfit_shards_are_refused_in_a_sentence(path, change, message):
-    edit(path, change)
+    with edited(path) as file:
+        change(file)
     with pytest.raises(UserError) as error:
         read_shard(path)
     text = str(error.value)
@@ -151,8 +139,7 @@ def test_any_flipped_bit_is_noticed(path):
     content = path.read_bytes()
     generator = np.random.default_rng(0)
     size = len(content)
-    places = {0, 1, 60, 130, 511, 512, 520, 600, size - 1, *generator.integers(0, size, 300)}
-    for place in places:
+    for place in {0, 1, 60, 130, 511, 512, 520, 600, size - 1, *generator.integers(0, size, 300)}:
         flipped = bytearray(content)
         flipped[place] ^= 1 << int(generator.integers(8))
         path.write_bytes(flipped)

@@ -1,17 +1,11 @@
 """The rule that generates shards hands the configuration on."""
 
-from __future__ import annotations
-
-import os
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from tests.patience import HANG_SECONDS
+from tests.programs import CHECKOUT, checkout_environment, run
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 MODELS = "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
 
 
@@ -31,13 +25,6 @@ def test_moduli_and_workers_reach_the_command(tmp_path, dataset, distribution, e
     config.write_text(f"{MODELS}dataset: {dataset}\n")
     command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", "-n", "-p"]
     command += [f"results/dataset/{distribution}-0.h5", "--cores", 2, "--configfile", config]
-    done = subprocess.run(
-        [str(part) for part in command],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-    )
+    done = run(*command, cwd=tmp_path, env=checkout_environment())
     assert done.returncode == 0, done.stdout + done.stderr
     assert expected in done.stdout + done.stderr

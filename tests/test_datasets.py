@@ -1,7 +1,5 @@
 """What is read from HDF5 files has the shape and the kind of numbers that it should have."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

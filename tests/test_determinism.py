@@ -1,7 +1,5 @@
 """What gives the same bits again, and what only agrees to a bound (docs/reproducibility.md)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

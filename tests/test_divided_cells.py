@@ -1,7 +1,5 @@
 """Finite cells know how far they are from the solid, and are divided where that is too far."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -21,11 +19,9 @@ from solver.__main__ import main
 from solver.accuracy import solving
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.estimate import estimate_cell_errors
-from solver.analysis.modal_solver import modal_analysis
-from solver.analysis.options import SolverOptions
 from solver.files.modes_file import read_modes
 from studies.accuracy.solids import SOLIDS
-from tests import cut_solids
+from tests import cut_solids, solids
 from tests.cut_solids import spaced, uniform
 from tests.rank_counts import TO_THREE
 
@@ -46,7 +42,7 @@ def some(request):
 
 
 def solved(model, modes, method="slepc"):
-    found = modal_analysis(model, SolverOptions(modes=modes, method=method))
+    found = solids.analysed(model, modes=modes, method=method)
     return found.values, found.system.gather(found.vectors)
 
 
@@ -57,8 +53,7 @@ def test_divided_cells_fit_each_other(some):
     assert set(np.unique(cells.span)) == {2, 4}
     assert cells.volume == pytest.approx(whole.volume, rel=1e-2)
     assert (np.diff(np.unique(division.parent)) > 0).all()
-    places = cells.grid // 4 * 2
-    np.testing.assert_array_equal(places, whole.grid[division.parent])
+    np.testing.assert_array_equal(cells.grid // 4 * 2, whole.grid[division.parent])
     # In one piece, by the neighbours that share faces.
     assert (laplacian_modes(uniform(cells).hexmesh, 2)[0] > 1e-9).tolist() == [False, True]
 
@@ -99,8 +94,7 @@ def test_hanging_nodes_say_what_the_whole_cell_says():
         on_faces = ((NODES == 0) & low) | ((NODES == 2) & ~low)
         middles = (NODES == 1).any(axis=1)
         # All that lies on the three outer faces of the whole cell hangs.
-        hangs = (on_faces.any(axis=1) & middles)[None]
-        kind = hanging.kinds_of_cells(np.array([octant]), hangs)
+        kind = hanging.kinds_of_cells(np.array([octant]), (on_faces.any(axis=1) & middles)[None])
         places = (corner * 2 + hanging.node_places(kind)[0]) / 4.0
         values = hanging.node_weights(kind)[0] @ (shape_functions(places) @ field)
         np.testing.assert_allclose(
@@ -186,7 +180,7 @@ def test_any_number_of_ranks_divides_the_same_cells(ranks, alone, mpiexec, tmp_p
 def test_files_hold_divided_cells(alone):
     file = alone[1]
     assert file.model.cells.is_mixed and file.model.cells.is_consistent()
-    values = modal_analysis(file.model, SolverOptions(modes=20, method="slepc")).values
+    values = solids.analysed(file.model, modes=20, method="slepc").values
     np.testing.assert_allclose(values[6:], file.eigenvalues[6:], rtol=1e-6)
     # Two materials: the voxels of divided cells have those of where they are.
     assert len(np.unique(file.model.young)) == 2
@@ -199,8 +193,7 @@ def test_voxels_are_told_their_distance(tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     exact = cut_solids.eigenvalues(uniform(finite_cells(builtin_surface("bell"), 24)), 16)[6:]
     true = np.array(told["frequencies_hz"][6:]) * 2.0 * np.pi / np.sqrt(exact) - 1.0
-    rms = np.sqrt(np.mean(true**2))
-    assert 0.7 < told["solid_frequency_error_rms"] / rms < 1.4
+    assert 0.7 < told["solid_frequency_error_rms"] / np.sqrt(np.mean(true**2)) < 1.4
     main([*command, "--no-estimate"])
     assert "distance" not in capsys.readouterr().out
 
@@ -249,8 +242,7 @@ def test_a_resolution_is_chosen(tmp_path, capsys, monkeypatch):
     assert main(command) == 2
     assert "expected --resolution" in capsys.readouterr().err
     young = tmp_path / "young.txt"
-    cells = finite_cells(builtin_surface("plate"), 6).mesh.n_cells
-    np.savetxt(young, np.full(cells, 1e9))
+    np.savetxt(young, np.full(finite_cells(builtin_surface("plate"), 6).mesh.n_cells, 1e9))
     of_file = ["--resolution", "6", "--accuracy", "0.0001", "--material", str(young)]
     assert main([*command, *of_file]) == 2
     assert "is of the voxels of that one" in capsys.readouterr().err

@@ -1,9 +1,5 @@
 """Every command of the README and of all pages but that on sound runs as it stands there."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from tests.documentation import CHECKOUT, PAGES, SOUND, Reader, has_commands
@@ -20,11 +16,11 @@ def reader(tmp_path_factory) -> Reader:
 @pytest.mark.nightly
 @pytest.mark.mpi
 @pytest.mark.parametrize("page", RUN, ids=lambda page: str(page.relative_to(CHECKOUT)))
-def test_commands_of_a_page_run(reader: Reader, page: Path):
+def test_commands_of_a_page_run(reader, page):
     assert reader.follow(page)
 
 
 @pytest.mark.nightly
-def test_the_example_of_the_readme_prints_frequencies(reader: Reader):
+def test_the_example_of_the_readme_prints_frequencies(reader):
     *_, frequencies = reader.follow(CHECKOUT / "README.md")
     assert len(frequencies.strip("[]\n").split()) == 34

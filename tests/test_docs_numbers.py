@@ -1,7 +1,5 @@
 """Numbers that pages quote are those of the kept tables and of the code."""
 
-from __future__ import annotations
-
 import json
 import re
 from functools import cache
@@ -85,8 +83,7 @@ def test_arpack_without_a_factorisation_took_what_the_page_says():
 
 def test_the_tutorial_names_all_solids_that_come_along():
     section = words("docs/tutorials/modes.md").split("`builtin:NAME` with")[1].split(". ")[0]
-    named = set(re.findall(r"[a-z]+(?:-[a-z]+)*", section))
-    assert {*BUILTINS, *THIN, *TRIALS} <= named
+    assert {*BUILTINS, *THIN, *TRIALS} <= set(re.findall(r"[a-z]+(?:-[a-z]+)*", section))
 
 
 def test_the_table_of_wall_times_is_that_of_the_reference():

@@ -1,7 +1,5 @@
 """The pages hang together: links, contents, marks of blocks, and the parts made from sources."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import re
@@ -93,8 +91,7 @@ def test_included_files_exist():
 
 
 def test_make_targets_exist():
-    text = "\n".join(page.read_text() for page in PAGES)
-    named = set(re.findall(r"[`(\n]make ([a-z]+)", text))
+    named = set(re.findall(r"[`(\n]make ([a-z]+)", "\n".join(page.read_text() for page in PAGES)))
     targets = set(re.findall(r"^([a-z]+):", (CHECKOUT / "Makefile").read_text(), re.MULTILINE))
     assert {"run", "test", "env", "check", "docs"} <= named <= targets
 
@@ -116,9 +113,10 @@ def test_every_command_has_its_help_on_a_page():
     assert sorted(headings) == sorted(every)
 
 
-def inline(page: Path) -> list[str]:
-    """Code within sentences of a page."""
-    return re.findall(r"`([^`\n]+)`", prose(page))
+def in_code(pattern: str) -> list[tuple[Path, str]]:
+    """What a pattern finds in the code within sentences, with its page."""
+    codes = [(page, code) for page in PAGES for code in re.findall(r"`([^`\n]+)`", prose(page))]
+    return [(page, text) for page, code in codes for text in re.findall(pattern, code)]
 
 
 OTHERS = {"--mpi", "--unlock", "--oversubscribe", "--tier", "--durations", "--measured"}
@@ -126,31 +124,24 @@ OTHERS = {"--mpi", "--unlock", "--oversubscribe", "--tier", "--durations", "--me
 
 
 def test_options_that_pages_name_exist():
-    text = "\n".join(map(command_help.of_room, ROOMS))
-    known = {*re.findall(r"--[a-z][a-z-]*", text), *OTHERS}
-    for page in PAGES:
-        for code in inline(page):
-            for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", code):
-                # Any option may be shortened.
-                assert any(each.startswith(option) for each in known), (page.name, code)
+    known = {*re.findall(r"--[a-z][a-z-]*", "\n".join(map(command_help.of_room, ROOMS))), *OTHERS}
+    for page, option in in_code(r"(?<![\w-])--[a-z][a-z-]*"):
+        # Any option may be shortened.
+        assert any(each.startswith(option) for each in known), (page.name, option)
 
 
 def test_commands_that_pages_name_exist():
     known = {*commands(), *studies()}
-    for page in PAGES:
-        for code in inline(page):
-            for name in re.findall(r"(?:^|/)carillon ([a-z][a-z-]*)", code):
-                assert name in known, (page.name, code)
+    for page, name in in_code(r"(?:^|/)carillon ([a-z][a-z-]*)"):
+        assert name in known, (page.name, name)
 
 
 def test_targets_that_pages_name_exist():
     rules = [*CHECKOUT.glob("workflow/rules/*.smk"), *CHECKOUT.glob("studies/*/*.smk")]
     known = {name for file in rules for name in re.findall(r"^rule (\w+):", file.read_text(), re.M)}
     known |= {study.name for study in catalogue.all_studies().values() if study.target}
-    for page in PAGES:
-        for code in inline(page):
-            for name in re.findall(r"^(?:\S*/)?snakemake (?:--cores \d+ )?([a-z]\w+)$", code):
-                assert name in known, (page.name, code)
+    for page, name in in_code(r"^(?:\S*/)?snakemake (?:--cores \d+ )?([a-z]\w+)$"):
+        assert name in known, (page.name, name)
 
 
 def test_public_functions_have_an_example():

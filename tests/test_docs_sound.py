@@ -1,7 +1,5 @@
 """Every command of the tutorial on sound runs as it stands there."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.documentation import SOUND, Reader

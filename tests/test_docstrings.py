@@ -1,7 +1,5 @@
 """Docstrings of what is public are numpydoc: every entry of a section has its description below."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator
@@ -9,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT
+
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 """Packages whose docstrings keep to it."""
 

@@ -1,11 +1,7 @@
 """The environment starts with no variable set and is fast; licence and citation are in order."""
 
-from __future__ import annotations
-
 import json
 import re
-import subprocess
-import sys
 import tomllib
 from importlib import metadata
 from pathlib import Path
@@ -14,35 +10,19 @@ import pytest
 import yaml
 
 import carillon
-from tests.patience import HANG_SECONDS
+from tests.programs import CHECKOUT, python
 
 pytestmark = pytest.mark.system
-
-CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 def test_petsc_and_slepc_start_in_an_empty_environment():
     program = "from petsc4py import PETSc; from slepc4py import SLEPc; SLEPc.EPS().create()"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={},
-        cwd="/",
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-    )
+    done = python("-c", program, env={}, cwd="/")
     assert done.returncode == 0, done.stderr
 
 
 def test_the_packages_import_from_any_folder_without_pythonpath():
-    done = subprocess.run(
-        [sys.executable, "-c", "import carillon; print(carillon.__file__)"],
-        env={},
-        cwd="/",
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-    )
+    done = python("-c", "import carillon; print(carillon.__file__)", env={}, cwd="/")
     assert Path(done.stdout.strip()).parent == CHECKOUT / "carillon", done.stderr
 
 

@@ -1,31 +1,16 @@
 """Every example says what it shows, stands in the gallery, and runs."""
 
-from __future__ import annotations
-
 import ast
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import gallery
 import pytest
 
-from tests.patience import HANG_SECONDS
+from tests.programs import checkout_environment, python
 
-CHECKOUT = Path(__file__).resolve().parent.parent
-SLOW = {
-    "a_scene",
-    "a_study",
-    "coarsening",
-    "design_from_a_clip",
-    "export_a_design",
-    "melody",
-    "own_objective",
-    "pan_of_two_materials",
-    "strike_and_hear",
-    "train_forests",
-}
+SLOW = set(
+    "a_scene a_study coarsening design_from_a_clip export_a_design melody own_objective "
+    "pan_of_two_materials strike_and_hear train_forests".split()
+)
 """Examples that take more than ten seconds, and are run each night."""
 LIGHT = 60_000
 """Bytes of a picture in the checkout."""
@@ -69,14 +54,8 @@ def test_pictures_are_light_and_of_examples_that_are_there():
 )
 def test_an_example_runs_and_draws_its_picture(script, tmp_path):
     pytest.importorskip("mujoco") if script.stem == "a_scene" else None
-    done = subprocess.run(
-        [sys.executable, "-W", "error::DeprecationWarning", script],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT), "MPLBACKEND": "Agg"},
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-    )
+    environment = checkout_environment(MPLBACKEND="Agg")
+    done = python("-W", "error::DeprecationWarning", script, cwd=tmp_path, env=environment)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / gallery.picture_of(script).name).stat().st_size > 5_000
 

@@ -1,7 +1,5 @@
 """A result file is complete or absent, and a bad one is named in one sentence."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import json
@@ -22,8 +20,7 @@ from carillon.files import atomic, hdf5
 from carillon.files.atomic import atomic_path
 from carillon.files.hdf5 import create_h5, kind_of, open_h5
 from carillon.files.paths import require_file, require_writable
-
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT, python
 
 
 @pytest.fixture
@@ -45,17 +42,11 @@ def test_what_was_written_is_read_back(shard):
         assert np.array_equal(file["young"], np.arange(1000.0))
 
 
-def test_an_exception_leaves_no_file_behind(tmp_path):
-    path = tmp_path / "modes.h5"
-    with pytest.raises(RuntimeError), create_h5(path, "modes", 1) as file:
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_an_exception_leaves_no_file_behind(tmp_path, error):
+    with pytest.raises(error), create_h5(tmp_path / "modes.h5", "modes", 1) as file:
         file["eigenvalues"] = np.ones(3)
-        raise RuntimeError("interrupted")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_an_interrupt_from_the_keyboard_leaves_no_file_behind(tmp_path):
-    with pytest.raises(KeyboardInterrupt), create_h5(tmp_path / "modes.h5", "modes", 1):
-        raise KeyboardInterrupt
+        raise error
     assert list(tmp_path.iterdir()) == []
 
 
@@ -82,74 +73,43 @@ def test_permissions_follow_the_umask(shard):
     assert stat.S_IMODE(shard.stat().st_mode) == 0o666 & ~umask
 
 
-def test_a_missing_folder_is_named_before_any_work(tmp_path):
-    with pytest.raises(UserError) as caught:
-        require_writable(tmp_path / "nowhere" / "modes.h5")
-    assert "nowhere does not exist" in one_sentence(caught)
+@pytest.mark.parametrize(
+    ("path", "says"),
+    [
+        ("nowhere/modes.h5", "nowhere does not exist"),
+        ("", "is a folder"),
+        # Not even root may create files there.
+        ("/proc/modes.h5", "/proc/modes.h5: cannot be written"),
+    ],
+)
+def test_where_nothing_can_be_written_is_told_before_any_work(tmp_path, path, says):
+    with pytest.raises(UserError, match=says) as caught:
+        require_writable(tmp_path / path)
+    one_sentence(caught)
 
 
-def test_a_folder_is_no_file_to_write(tmp_path):
-    with pytest.raises(UserError) as caught:
-        require_writable(tmp_path)
-    assert "is a folder" in one_sentence(caught)
-
-
-def test_a_folder_that_cannot_be_written_to_is_named():
-    with pytest.raises(UserError) as caught:
-        require_writable("/proc/modes.h5")  # not even root may create files there
-    assert "/proc/modes.h5: cannot be written" in one_sentence(caught)
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(UserError) as caught, open_h5(tmp_path / "absent.h5", "shard", 3):
-        pass
-    assert "absent.h5: no such file, expected a Carillon shard file" in one_sentence(caught)
-
-
-def test_a_file_that_is_not_hdf5_is_refused(tmp_path):
-    path = tmp_path / "text.h5"
-    path.write_text("these are no numbers\n")
-    with pytest.raises(UserError) as caught, open_h5(path, "shard", 3):
-        pass
-    assert "is not readable as HDF5" in one_sentence(caught)
-
-
-def test_an_empty_file_is_refused(tmp_path):
-    path = tmp_path / "empty.h5"
-    path.touch()
-    with pytest.raises(UserError) as caught, open_h5(path, "shard", 3):
-        pass
-    assert "is not readable as HDF5" in one_sentence(caught)
-
-
-def test_a_truncated_file_is_refused(shard):
-    with open(shard, "rb+") as stream:
-        stream.truncate(shard.stat().st_size // 2)
-    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 3):
-        pass
-    assert "is not readable as HDF5" in one_sentence(caught)
-
-
-def test_a_file_of_another_kind_is_refused(shard):
-    with pytest.raises(UserError) as caught, open_h5(shard, "modes", 3):
-        pass
-    assert "holds 'shard', expected a Carillon modes file" in one_sentence(caught)
-
-
-def test_a_foreign_hdf5_file_is_refused(tmp_path):
-    path = tmp_path / "foreign.h5"
+def foreign(path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["x"] = 1
-    with pytest.raises(UserError) as caught, open_h5(path, "modes", 3):
-        pass
-    assert "expected a Carillon modes file" in one_sentence(caught)
 
 
-def test_an_older_schema_is_refused(shard):
-    with pytest.raises(UserError) as caught, open_h5(shard, "shard", 4):
+@pytest.mark.parametrize(
+    ("change", "kind", "schema", "says"),
+    [
+        (Path.unlink, "shard", 3, "shard.h5: no such file, expected a Carillon shard file"),
+        (lambda path: path.write_text("no numbers"), "shard", 3, "is not readable as HDF5"),
+        (lambda path: path.write_text(""), "shard", 3, "is not readable as HDF5"),
+        (lambda path: os.truncate(path, 5000), "shard", 3, "is not readable as HDF5"),
+        (Path.touch, "modes", 3, "holds 'shard', expected a Carillon modes file"),
+        (foreign, "modes", 3, "expected a Carillon modes file"),
+        (Path.touch, "shard", 4, "schema 3, .*schema 4.*generate the file again"),
+    ],
+)
+def test_what_is_no_file_of_the_kind_and_schema_is_refused(shard, change, kind, schema, says):
+    change(shard)
+    with pytest.raises(UserError, match=says) as caught, open_h5(shard, kind, schema):
         pass
-    text = one_sentence(caught)
-    assert "schema 3" in text and "schema 4" in text and "generate the file again" in text
+    one_sentence(caught)
 
 
 def test_a_flipped_byte_is_noticed_on_reading(tmp_path):
@@ -250,12 +210,7 @@ sys.exit(exit_status.run("program", main))
 @pytest.mark.parametrize("largest_file", [100, 3000, 200_000, 400_000])
 def test_a_full_disk_is_one_sentence_and_no_crash_of_hdf5(tmp_path, largest_file):
     path = tmp_path / "modes.h5"
-    done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK, str(path), str(largest_file)],
-        cwd=CHECKOUT,
-        capture_output=True,
-        text=True,
-    )
+    done = python("-c", FULL_DISK, path, largest_file, cwd=CHECKOUT)
     assert done.returncode == 2, done.stderr
     assert done.stderr == (
         f"program: {path}: could not be written (File too large; make room and run the same "

@@ -1,7 +1,5 @@
 """Modes of finite cells are those of the real solid, by every method and on any number of ranks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py
@@ -15,7 +13,7 @@ from carillon.fem.geometry import builtin_surface
 from carillon.fem.materials import young_modulus
 from solver.__main__ import main
 from solver.accuracy.divide import DividedCells
-from solver.analysis.modal_solver import ModalSolver, modal_analysis
+from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.files.modes_file import read_modes, write_modes
@@ -28,7 +26,7 @@ from studies.accuracy.ritz import free_eigenvalues
 from studies.accuracy.solids import SOLIDS
 from tests import cut_solids, solids
 from tests.cut_solids import box, spaced, turned, uniform
-from tests.edited_files import edited
+from tests.edited_files import edited, put
 from tests.rank_counts import TO_THREE
 
 PROGRAM = Path(__file__).with_name("distributed_checks.py")
@@ -55,7 +53,7 @@ def test_solids_turned_against_the_lattice(name, spacing, goal):
     cover = covering(surface, round(float(np.ptp(surface.bounds, axis=0).max()) / spacing))
     cells, done = DividedCells(cover, uniform(cover.cells)), False
     while not done:
-        found = modal_analysis(cells.model, SolverOptions(modes=36, method="slepc"))
+        found = solids.analysed(cells.model, modes=36, method="slepc")
         modes = found.system.gather(found.vectors)
         done = cells.advance(found.values, modes, ALLOWED_DISTANCE)[1]
     errors = np.sqrt(found.values[6:]) / (2.0 * np.pi * exact) - 1.0
@@ -71,20 +69,12 @@ def test_the_bells_equal_pairs_stay_pairs():
 def test_frequencies_fall_towards_those_of_the_solid():
     sides = (0.2, 0.1, 0.05)
     degrees = (10, 10, 10)
-    exact = free_eigenvalues(
-        domains.box(sides, degrees),
-        degrees,
-        cut_solids.YOUNG,
-        cut_solids.POISSON,
-        cut_solids.DENSITY,
-    )[6:12]
-    errors = [
-        np.abs(
-            cut_solids.eigenvalues(uniform(spaced(turned(box(*sides)), spacing)), 12)[6:] / exact
-            - 1
-        )
-        for spacing in (0.05, 0.025, 0.0125)
-    ]
+    constants = cut_solids.YOUNG, cut_solids.POISSON, cut_solids.DENSITY
+    exact = free_eigenvalues(domains.box(sides, degrees), degrees, *constants)[6:12]
+    errors = []
+    for spacing in (0.05, 0.025, 0.0125):
+        model = uniform(spaced(turned(box(*sides)), spacing))
+        errors.append(np.abs(cut_solids.eigenvalues(model, 12)[6:] / exact - 1))
     assert (errors[1] < errors[0]).all() and (errors[2] < errors[1]).all()
     # Fourth order in the spacing where modes are smooth; edges take a part of it.
     rates = np.log2(errors[0] / errors[2]) / 2.0
@@ -96,11 +86,9 @@ def test_frequencies_fall_towards_those_of_the_solid():
     [("hcms", name) for name in INTERFACES] + [("slepc", "overlapping"), ("arpack", "overlapping")],
 )
 def test_every_method_finds_the_modes(material, method, interface):
+    given = {"modes": 24, "subdomains": 4, "tolerance": 1e-10}
+    values = solids.analysed(material, method=method, interface=interface, **given).values
     exact = solids.dense_eigenvalues(material)
-    options = SolverOptions(
-        modes=24, method=method, subdomains=4, tolerance=1e-10, interface=interface
-    )
-    values = modal_analysis(material, options).values
     assert np.abs(values[6:] / exact[6:24] - 1.0).max() < 1e-7
 
 
@@ -109,7 +97,7 @@ def test_a_millionfold_contrast_where_the_surface_cuts(material):
     model = material.with_young(young)
     exact = solids.dense_eigenvalues(model)
     for method in ("hcms", "slepc"):
-        values = modal_analysis(model, SolverOptions(modes=16, method=method)).values
+        values = solids.analysed(model, modes=16, method=method).values
         assert np.abs(values[6:] / exact[6:16] - 1.0).max() < 1e-5
 
 
@@ -118,7 +106,7 @@ def test_other_moduli_without_another_analysis(material):
     first = solver.solve()
     young = material.young * np.linspace(0.9, 1.1, len(material.young))
     warm = solver.solve(young, initial_modes=first)
-    cold = modal_analysis(material.with_young(young), SolverOptions(modes=12, tolerance=1e-10))
+    cold = solids.analysed(material.with_young(young), modes=12, tolerance=1e-10)
     assert np.abs(warm.values[6:] / cold.values[6:] - 1.0).max() < 1e-8
     with pytest.raises(UserError, match="moduli: an array of shape"):
         solver.solve(young[:-1])
@@ -133,7 +121,7 @@ def test_ranks_agree(mpiexec, ranks):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory, material):
     path = tmp_path_factory.mktemp("cells") / "modes.h5"
-    modes = modal_analysis(material, SolverOptions(modes=12, method="slepc"))
+    modes = solids.analysed(material, modes=12, method="slepc")
     block = modes.system.gather(modes.vectors)
     write_modes(path, material, modes.values, [block], modes.residuals, {"method": "slepc"}, {})
     return path
@@ -154,7 +142,7 @@ def test_modes_of_voxels_are_told_on_finite_cells_and_back(tmp_path):
         ("cells", ProblemOptions("builtin:box", 8, discretisation="finite-cell")),
     ):
         model = build_problem(options).model
-        modes = modal_analysis(model, SolverOptions(modes=12, method="slepc"))
+        modes = solids.analysed(model, modes=12, method="slepc")
         block = modes.system.gather(modes.vectors)
         write_modes(tmp_path / name, model, modes.values, [block], modes.residuals, {}, {})
     for one, other in (("voxels", "cells"), ("cells", "voxels")):
@@ -179,13 +167,10 @@ def test_modes_of_voxels_are_told_on_finite_cells_and_back(tmp_path):
     ids=["rows", "nodes", "voxels", "first weights", "not finite", "moduli"],
 )
 def test_files_that_do_not_fit_are_refused(written, tmp_path, change):
-    name, new = change
     path = tmp_path / "other.h5"
     path.write_bytes(written.read_bytes())
     with edited(path) as file:
-        values = file[name][()]
-        del file[name]
-        file[name] = new(values)
+        put(*change)(file)
     with pytest.raises(UserError):
         read_modes(path)
 
@@ -217,14 +202,10 @@ def test_named_materials(name):
 
 
 def test_a_material_of_voxels_is_refused(tmp_path):
-    voxels = build_problem(ProblemOptions("builtin:bar", 12))
-    np.save(tmp_path / "young.npy", voxels.young)
+    path = str(tmp_path / "young.npy")
+    np.save(path, build_problem(ProblemOptions("builtin:bar", 12)).young)
     with pytest.raises(UserError, match="young.npy"):
-        build_problem(
-            ProblemOptions(
-                "builtin:bar", 12, str(tmp_path / "young.npy"), discretisation="finite-cell"
-            )
-        )
+        build_problem(ProblemOptions("builtin:bar", 12, path, discretisation="finite-cell"))
 
 
 def test_points_of_the_surface_move_with_it():

@@ -1,7 +1,5 @@
 """Finite cells hold what is inside the surface, whatever the surface and wherever it lies."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -18,6 +16,7 @@ from carillon.fem.laplacian import laplacian_modes
 from solver.assembly.sparse import assembled
 from tests import cut_solids
 from tests.cut_solids import box, spaced, turned, uniform
+from tests.mesh_files import inside_out, soup, with_turned
 
 SIDES = (0.24, 0.16, 0.12)
 
@@ -74,39 +73,18 @@ def test_lines_cross_a_closed_surface_as_often_in_as_out():
             assert (np.diff(lines.place)[np.diff(line) == 0] >= 0.0).all()
 
 
-def inverted(surface):
-    surface.invert()
-    return surface
-
-
-def open_sphere():
-    sphere = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
-    sphere.update_faces(np.arange(len(sphere.faces)) != 7)
-    return sphere
-
-
-def unmerged(surface):
-    return trimesh.Trimesh(
-        surface.triangles.reshape(-1, 3),
-        np.arange(3 * len(surface.faces)).reshape(-1, 3),
-        process=False,
-    )
-
-
-def one_flipped(surface):
-    faces = surface.faces.copy()
-    faces[0] = faces[0][::-1]
-    return trimesh.Trimesh(surface.vertices, faces, process=False)
+OPEN = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+OPEN.update_faces(np.arange(len(OPEN.faces)) != 7)
 
 
 @pytest.mark.parametrize(
     ("surface", "volume", "tolerance"),
     [
-        (inverted(turned(box(*SIDES))), 0.004608, 1e-3),
-        (unmerged(turned(box(*SIDES))), 0.004608, 1e-3),
+        (inside_out(turned(box(*SIDES))), 0.004608, 1e-3),
+        (soup(turned(box(*SIDES))), 0.004608, 1e-3),
         (trimesh.util.concatenate([box(0.2, 0.05, 0.05), box(0.05, 0.2, 0.05)]), 8.75e-4, 1e-3),
-        (open_sphere(), 4.0 / 3.0 * np.pi * 1e-3, 0.01),
-        (one_flipped(box(0.2, 0.2, 0.05)), 0.002, 0.1),
+        (OPEN, 4.0 / 3.0 * np.pi * 1e-3, 0.01),
+        (with_turned(box(0.2, 0.2, 0.05), 0), 0.002, 0.1),
         (builtin_surface("bell"), 8.794e-4, 2e-3),
     ],
     ids=["inverted", "unmerged", "overlapping", "open", "one face flipped", "bell"],
@@ -127,8 +105,7 @@ def test_rigid_motions_and_a_constant_strain():
     density = cut_solids.YOUNG * voigt @ elasticity_matrix(cut_solids.POISSON) @ voigt
     assert motion @ K @ motion == pytest.approx(density * cells.volume, rel=1e-6)
     spin = gradient - gradient.T
-    turn = (nodes @ spin.T).ravel()
-    assert np.abs(K @ turn).max() < 1e-12 * np.abs(K @ motion).max()
+    assert np.abs(K @ (nodes @ spin.T).ravel()).max() < 1e-12 * np.abs(K @ motion).max()
     along = np.tile([1.0, 0.0, 0.0], len(nodes))
     mass = cut_solids.DENSITY * cells.volume
     assert along @ M @ along == pytest.approx(mass, rel=10 * FLOOR * len(cells))
@@ -137,8 +114,7 @@ def test_rigid_motions_and_a_constant_strain():
 
 def test_stiffness_is_linear_in_the_moduli_of_the_voxels():
     cells = spaced(turned(box(0.2, 0.12, 0.05)), 0.03)
-    rng = np.random.default_rng(0)
-    one, other = rng.uniform(1e8, 1e9, (2, cells.mesh.n_cells))
+    one, other = np.random.default_rng(0).uniform(1e8, 1e9, (2, cells.mesh.n_cells))
     model = uniform(cells)
     sums = [model.with_young(young).stiffness() for young in (one, other, one + 2.0 * other)]
     assert np.allclose(sums[0] + 2.0 * sums[1], sums[2], rtol=1e-12, atol=1e-9)
@@ -164,8 +140,7 @@ def test_pieces_that_a_finer_lattice_joins_are_told_the_resolution():
 def test_prongs_of_a_fork_are_copies_of_cells():
     """The two prongs meet at one end only, however close they are."""
     prongs = [box(0.2, 0.013, 0.02, at=(0.02, side * 0.0085, 0.0)) for side in (-1, 1)]
-    handle = box(0.04, 0.03, 0.02, at=(-0.1, 0.0, 0.0))
-    fork = trimesh.util.concatenate([*prongs, handle])
+    fork = trimesh.util.concatenate([*prongs, box(0.04, 0.03, 0.02, at=(-0.1, 0.0, 0.0))])
     cells = finite_cells(fork, 12)
     last = np.flatnonzero(cells.grid[:, 0] == cells.grid[:, 0].max())
     weights = cells.weights.sum(axis=1)[cells.row[last]]
@@ -227,5 +202,4 @@ def test_what_is_refused(surface, resolution, sentence):
 
 
 def test_a_surface_that_just_reaches_into_cells_has_none_there():
-    cells = finite_cells(box(0.2, 0.15, 0.1 * (1.0 + 1e-9)), 8)
-    assert len(cells) == 24
+    assert len(finite_cells(box(0.2, 0.15, 0.1 * (1.0 + 1e-9)), 8)) == 24

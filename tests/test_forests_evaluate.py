@@ -182,8 +182,7 @@ def test_thresholds_rounded_down_divide_float32_alike():
     rounded = rounded_down(thresholds)
     assert rounded.dtype == np.float32
     x = np.unique(np.concatenate([near, up, down, [np.inf, -np.inf]]).astype(np.float32))
-    as_double = x[:, None].astype(float) <= thresholds
-    np.testing.assert_array_equal(x[:, None] <= rounded, as_double)
+    np.testing.assert_array_equal(x[:, None] <= rounded, x[:, None].astype(float) <= thresholds)
 
 
 @EVERY
@@ -217,8 +216,7 @@ def test_scikit_learns_own_thresholds_divide_alike():
     target = features @ np.arange(7.0)
     grown = ExtraTreeRegressor(max_depth=9, random_state=0).fit(features, target)
     tree = flatten(grown.tree_)
-    exact = tree.threshold[tree.left >= 0]
-    rows = generator.choice(exact, (4000, 7)).astype(np.float32)
+    rows = generator.choice(tree.threshold[tree.left >= 0], (4000, 7)).astype(np.float32)
     rows[1::3] = np.nextafter(rows[1::3], np.float32(np.inf))
     rows[2::3] = np.nextafter(rows[2::3], np.float32(-np.inf))
     records = np.zeros((tree.leaves, 10), dtype=np.float32)
@@ -229,8 +227,7 @@ def test_scikit_learns_own_thresholds_divide_alike():
     while ((link := nodes["link"][node]) >= 0).any():
         chosen = rows[np.arange(len(rows)), np.where(link >= 0, link & 7, 0)]
         node = np.where(link >= 0, (link >> 3) + (chosen > nodes["threshold"][node]), node)
-    expected = tree.leaf[grown.apply(rows)]
-    np.testing.assert_array_equal(leaves[~link, 0], expected)
+    np.testing.assert_array_equal(leaves[~link, 0], tree.leaf[grown.apply(rows)])
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3, 4, 20])
@@ -282,8 +279,7 @@ def smooth_moduli(model, young, leaves, cells):
             x = ratios
         for tree in range(model.forests.trees):
             leaf = model.forests.leaves[leaves[origin, tree]].astype(float)
-            answer = leaf[:7] @ x + leaf[CONSTANT]
-            total[origin] += np.clip(answer, leaf[LOW], leaf[HIGH])
+            total[origin] += np.clip(leaf[:7] @ x + leaf[CONSTANT], leaf[LOW], leaf[HIGH])
     target = total / model.forests.trees
     return scale * (np.exp(target) if model.transform == "log" else target)
 
@@ -356,8 +352,7 @@ def test_answers_at_their_bounds_follow_the_scale_alone(blocks):
     held = replace(model, forests=replace(model.forests, leaves=leaves))
     solid = blocks[(blocks > 0).all(axis=1)]
     moduli, derivatives = coarsen_with_derivatives(held, solid)
-    expected = np.eye(8) * (moduli / solid)[:, :, None]
-    np.testing.assert_allclose(derivatives, expected, rtol=1e-14)
+    np.testing.assert_allclose(derivatives, np.eye(8) * (moduli / solid)[:, :, None], rtol=1e-14)
 
 
 def test_derivatives_are_constant_or_elasticities_are(models):

@@ -181,8 +181,7 @@ def test_dataset_does_not_depend_on_how_it_is_split(shards, tmp_path):
     pieces = [np.concatenate([p.position for p in d.training(0, 4000)]) for d in (one, other)]
     np.testing.assert_array_equal(*pieces)
     assert len(pieces[0]) == 3800
-    models = [train(data, QUICK, progress=False) for data in (one, other)]
-    equal_models(*models, exactly=False)
+    equal_models(*[train(data, QUICK, progress=False) for data in (one, other)], exactly=False)
 
 
 def equal_models(one, other, exactly=True):
@@ -210,8 +209,7 @@ def test_threads_and_jobs_give_the_same_trees_bit_for_bit(shards):
         alone = grow_trees(data, QUICK, range(job, job + 1), progress=False)[job]
         for name, values in vars(alone).items():
             np.testing.assert_array_equal(values, getattr(together[job], name))
-    models = [train(data, QUICK, workers, progress=False) for workers in (1, 3)]
-    equal_models(*models)
+    equal_models(*[train(data, QUICK, workers, progress=False) for workers in (1, 3)])
 
 
 def test_trees_of_a_forest_differ(shards):

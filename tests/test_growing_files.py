@@ -3,11 +3,8 @@
 All are read by one process with little memory, the valid ones near them too.
 """
 
-from __future__ import annotations
-
 import json
 import resource
-import subprocess
 import sys
 from pathlib import Path
 
@@ -23,6 +20,8 @@ from carillon.files.hdf5 import kind_of, open_h5
 from carillon.processes.memory import require_less_than
 from solver.files.modes_file import KIND, SCHEMA, read_modes, write_modes
 from tests.hostile import zoo_growing
+from tests.mesh_files import gltf
+from tests.programs import python
 
 ROOM, RISE = 400 << 20, 150 << 20
 """Bytes that the process may have beyond what it begins with, and may use for one file."""
@@ -67,12 +66,12 @@ def make(folder: Path) -> None:
     solid, rigid = fine_model(cube, np.ones(1)), np.tile([[1.0], [0.0], [0.0]], (8, 1))
     write_modes(folder / "modes.h5", solid, np.zeros(1), [rigid], np.zeros(1), {}, {}, near)
     zoo_growing.make(folder)
-    zoo_growing.box_gltf().written(folder / "box.glb")
-    file = zoo_growing.box_gltf()
+    gltf(zoo_growing.BOX).written(folder / "box.glb")
+    file = gltf(zoo_growing.BOX)
     file.header["nodes"] = [{"mesh": 0, "translation": [n, 0, 0]} for n in range(500)]
     file.header["scenes"] = [{"nodes": list(range(500))}]
     file.written(folder / "near-shared.glb")
-    file = zoo_growing.box_gltf()
+    file = gltf(zoo_growing.BOX)
     file.header["nodes"] = [*[{"children": [n + 1]} for n in range(100)], {"mesh": 0}]
     file.written(folder / "near-deep.glb")
     path = Path(file.written(folder / "near-beside.gltf"))
@@ -125,11 +124,7 @@ def read_all(folder: Path) -> None:
 def outcomes(tmp_path_factory):
     folder = tmp_path_factory.mktemp("growing")
     make(folder)
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.test_growing_files", str(folder)],
-        capture_output=True,
-        text=True,
-    )
+    done = python("-m", "tests.test_growing_files", folder)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert done.returncode == 0, f"ended after {rows[-1:]}: {done.stderr[-2000:]}"
     return {row["name"]: row for row in rows}
@@ -150,7 +145,7 @@ def test_a_file_near_those_is_read(outcomes, name):
 
 
 def test_all_growing_files_are_tried():
-    made = {*zoo_growing.MESHES, *zoo_growing.FILES}
+    made = {*zoo_growing.BOXES, *zoo_growing.MESHES, *zoo_growing.FILES}
     assert made == {*REFUSED, *(name for name in READ if name.startswith("grows-"))}
 
 
@@ -202,7 +197,7 @@ def test_a_process_with_little_memory_is_told_so():
         "except MemoryError as error:\n"
         "    print(*meaning(error))\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = python("-c", program)
     assert done.stdout.startswith("2 out of memory (Unable to allocate"), done.stderr
 
 

@@ -1,9 +1,6 @@
 """A folder that is held open: names in it, whole files, and nothing by way of links."""
 
-from __future__ import annotations
-
 import os
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +9,7 @@ from carillon.files.held_folder import HeldFolder
 
 
 @pytest.fixture
-def held(tmp_path: Path):
+def held(tmp_path):
     (tmp_path / "inner").mkdir()
     found = HeldFolder(tmp_path / "inner")
     yield found

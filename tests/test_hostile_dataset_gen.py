@@ -1,7 +1,5 @@
 """`python -m dataset_gen` meets hostile command lines and files; see `tests.hostile`."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.hostile.dataset_cases import TABLE

@@ -1,7 +1,5 @@
 """A folder of a stranger's: nothing in it is run, or read as settings of a library."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -16,12 +14,12 @@ import yaml
 from carillon.errors import UserError
 from carillon.processes import present_folder
 from tests.listening import has_loaded, listening
-from tests.patience import HANG_SECONDS, wait_for
+from tests.patience import wait_for
+from tests.programs import CHECKOUT, checkout_environment, python, run
 from tests.rank_counts import SEVERAL
 from tests.small_project import PROJECT, write_clips
 from workflow.disk_space import MODULES, require_own
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(sys.executable).with_name("carillon")
 """As it is installed; `python -m` takes modules from the present folder before anything can be said
 against it."""
@@ -30,7 +28,7 @@ BAR = ("builtin:bar", "--resolution", "12", "--modes", "12", "--out", "modes.h5"
 
 
 @pytest.fixture
-def planted(tmp_path: Path) -> Path:
+def planted(tmp_path) -> Path:
     """A folder with a module for every one of Python's, and settings of PETSc and numba."""
     folder, mark = tmp_path / "folder", tmp_path / "mark"
     folder.mkdir()
@@ -46,14 +44,7 @@ def planted(tmp_path: Path) -> Path:
 
 
 def carillon(folder: Path, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [PROGRAM, *words],
-        cwd=folder,
-        check=check,
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-    )
+    return run(PROGRAM, *words, cwd=folder, check=check)
 
 
 def project(folder: Path, workers: int) -> None:
@@ -133,14 +124,7 @@ def test_planted_files_are_what_would_run(planted, tmp_path):
     for program in ("import signal", "from petsc4py import PETSc", "import numba.core.config as c"):
         told = f"{program}; print(getattr(globals().get('c'), 'CACHE_DIR', ''))"
         plain = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
-        done = subprocess.run(
-            [sys.executable, *(() if "signal" in program else ("-P",)), "-c", told],
-            cwd=planted,
-            env=plain,
-            capture_output=True,
-            text=True,
-            timeout=HANG_SECONDS,
-        )
+        done = python(*(() if "signal" in program else ("-P",)), "-c", told, cwd=planted, env=plain)
         marked = (tmp_path / "mark").exists() or "kernels" in done.stdout
         assert marked, (program, done.stderr)
         (tmp_path / "mark").unlink(missing_ok=True)
@@ -152,9 +136,7 @@ def test_a_plot_looks_the_same_beside_settings_of_matplotlib(tmp_path):
         "import carillon, os, matplotlib as m\n"
         "print(m.rcParams['figure.facecolor'], os.getcwd(), m.__loader__.__class__.__name__)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, check=True, capture_output=True, text=True
-    )
+    done = python("-c", program, cwd=tmp_path, check=True)
     assert done.stdout.split() == ["white", str(tmp_path), "SourceFileLoader"]
 
 
@@ -178,13 +160,8 @@ def test_a_profile_of_snakemake_in_the_folder_is_not_taken(tmp_path):
 def test_settings_that_a_user_names_hold(tmp_path):
     (tmp_path / "mine").write_text("figure.facecolor: green\n")
     program = "import carillon, matplotlib as m; print(m.rcParams['figure.facecolor'])"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env={**os.environ, "MATPLOTLIBRC": "mine"},
-        check=True,
-        capture_output=True,
-        text=True,
+    done = python(
+        "-c", program, cwd=tmp_path, env={**os.environ, "MATPLOTLIBRC": "mine"}, check=True
     )
     assert done.stdout == "green\n"
 
@@ -205,9 +182,7 @@ def test_snakemake_adds_no_modules_of_the_present_folder(tmp_path):
     modules.mkdir(parents=True)
     (modules / "planted.py").write_text("print('run')\n")
     program = "import carillon, snakemake\ntry: import planted\nexcept ImportError: print('not')"
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, check=True, capture_output=True, text=True
-    )
+    done = python("-c", program, cwd=tmp_path, check=True)
     assert done.stdout == "not\n"
 
 
@@ -262,8 +237,8 @@ def test_ranks_of_one_machine_listen_nowhere(ranks, mpiexec):
 
 def test_a_lone_process_listens_nowhere():
     command = [sys.executable, "-m", "tests.listening"]
-    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
-    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    environment = checkout_environment()
+    done = run(*command, env=environment, check=True)
     assert json.loads(done.stdout) == {"sum": 0, "listening": [[]]}
 
 
@@ -271,8 +246,7 @@ def listening_of(process: psutil.Process, run: subprocess.Popen[str]) -> list[st
     """Where a process and those that it has started listen, once one of those has MPI."""
 
     def solvers() -> list[psutil.Process]:
-        begun = process.children(recursive=True)
-        return [each for each in begun if has_loaded(each, "libmpi")]
+        return [each for each in process.children(recursive=True) if has_loaded(each, "libmpi")]
 
     wait_for(solvers, "a process that has MPI", run)
     return listening([process, *process.children(recursive=True)])

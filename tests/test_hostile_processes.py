@@ -1,7 +1,5 @@
 """Hostile inputs as people start programs: processes of their own, two ranks, Snakemake itself."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.hostile.suite import snapshot
@@ -87,8 +85,7 @@ def test_a_launcher_is_no_other_command(launcher, tmp_path):
     text = CONFIGURATION.replace("cores: 1", f'cores: 2, ranks: 2, launcher: "{launcher}"')
     (tmp_path / "c.yaml").write_text(text)
     options = ["--cores", "2", "--configfile", "c.yaml", "--", "results/models/bar/truth.h5"]
-    done = snakemake(tmp_path, *options)
-    assert done.returncode == 1
+    assert snakemake(tmp_path, *options).returncode == 1
     assert not (tmp_path / "x").exists()
 
 

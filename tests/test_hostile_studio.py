@@ -1,7 +1,5 @@
 """`python -m studio` meets hostile command lines and files; see `tests.hostile`."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.hostile.fixtures import parameters

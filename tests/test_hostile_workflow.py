@@ -1,7 +1,5 @@
 """`python -m workflow`, `python -m carillon` and configurations; see `tests.hostile`."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.hostile import carillon_cases, configuration_cases, workflow_cases

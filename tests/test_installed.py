@@ -1,7 +1,5 @@
 """A wheel of the checkout, installed elsewhere, is whole: commands, rules and data files."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -12,10 +10,9 @@ import pytest
 
 from carillon import ROOMS
 from tests.patience import HANG_SECONDS
+from tests.programs import CHECKOUT, python, run
 
 pytestmark = pytest.mark.nightly
-
-CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +22,8 @@ def site(tmp_path_factory):
     pip = [sys.executable, "-m", "pip", "--quiet", "--no-input"]
     # From a copy: setuptools leaves its traces in the folder that it builds.
     copy = folder / "copy"
-    files = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=CHECKOUT,
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout
+    words = "git ls-files -z --cached --others --exclude-standard".split()
+    files = run(*words, cwd=CHECKOUT, check=True).stdout
     for name in filter(None, files.split("\0")):
         if (CHECKOUT / name).exists() and not name.startswith("tests/"):
             (copy / name).parent.mkdir(parents=True, exist_ok=True)
@@ -50,14 +42,7 @@ def installed(site, tmp_path):
     """Function that runs a program of the installation in an empty folder."""
 
     def run(*words: object) -> subprocess.CompletedProcess[str]:
-        done = subprocess.run(
-            [sys.executable, *map(str, words)],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(site)},
-            capture_output=True,
-            text=True,
-            timeout=HANG_SECONDS,
-        )
+        done = python(*words, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(site)})
         assert done.returncode == 0, done.stdout + done.stderr
         return done
 

@@ -1,16 +1,12 @@
 """Kernels are compiled and, where a folder can be written, kept, whoever runs the program."""
 
-from __future__ import annotations
-
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from carillon.processes import kernel_cache
-from tests.patience import HANG_SECONDS
+from tests.programs import python
 
 KERNEL = """
 import numba
@@ -48,14 +44,7 @@ def kernel(tmp_path):
         kept = {name: value for name, value in os.environ.items() if name not in removed}
         path = os.pathsep.join([str(source), *filter(None, [os.environ.get("PYTHONPATH")])])
         variables = {"XDG_CACHE_HOME": "/dev/null", "TMPDIR": str(temporary), "PYTHONPATH": path}
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT, place],
-            env={**kept, **variables},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=HANG_SECONDS,
-        )
+        done = python("-c", SCRIPT, place, env={**kept, **variables})
         assert done.returncode == 0, done.stderr
         return int(done.stdout), done.stderr
 

@@ -3,8 +3,6 @@
 When a run is killed hangs on the clock, and each run is made twice: all of this is nightly.
 """
 
-from __future__ import annotations
-
 import time
 
 import pytest

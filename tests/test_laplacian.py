@@ -1,7 +1,5 @@
 """Laplacian of the cells, its eigenvectors by multigrid, and the subdomains cut by coarse ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,18 +1,14 @@
 """Of two processes that work on one result, the second is told so; locks die with their holders."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from carillon.errors import UserError
 from carillon.files.locks import locked
-
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT
 
 HOLDER = """
 import sys

@@ -1,7 +1,5 @@
 """A mesh is the same solid, whichever of the ways that its format allows it is written in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +11,7 @@ from carillon.fem.geometry import load_surface, voxelize
 from carillon.fem.geometry.orientation import turned_alike
 from carillon.fem.geometry.plain_files import plain_obj
 from solver.analysis.problem import ProblemOptions, build_problem
-from tests.mesh_files import DTYPES, Gltf, block, concatenated
+from tests.mesh_files import DTYPES, Gltf, block, concatenated, gltf
 
 SIDES = np.array([0.4, 0.1, 0.1])
 BOX = block(tuple(-SIDES / 2), tuple(SIDES / 2))
@@ -167,10 +165,8 @@ def quantised(component: int, normalised: bool, stride: int | None = None) -> tu
 @pytest.mark.parametrize("normalised", [True, False], ids=["normalised", "plain"])
 @pytest.mark.parametrize("component", [5120, 5121, 5122, 5123])
 def test_quantised_positions_are_those_of_the_solid(tmp_path, component, normalised, ending):
-    stride = 4 if component in (5120, 5121) else 8
-    file, step = quantised(component, normalised, stride)
-    found = load_surface(file.written(tmp_path / f"box.{ending}"))
-    assert same_triangles(found, BOX, step)
+    file, step = quantised(component, normalised, 4 if component in (5120, 5121) else 8)
+    assert same_triangles(load_surface(file.written(tmp_path / f"box.{ending}")), BOX, step)
 
 
 def test_rounding_of_positions_adds_no_layer_of_voxels(tmp_path):
@@ -181,17 +177,10 @@ def test_rounding_of_positions_adds_no_layer_of_voxels(tmp_path):
     assert voxels.edge == pytest.approx(0.025, rel=1e-4)
 
 
-def plain_box() -> Gltf:
-    file = Gltf()
-    file.primitive["attributes"]["POSITION"] = file.accessor(np.asarray(BOX.vertices), 5126)
-    file.primitive["indices"] = file.accessor(np.asarray(BOX.faces).ravel(), 5125)
-    return file
-
-
 @pytest.mark.parametrize("base", [True, False], ids=["changed", "all"])
 def test_sparse_positions_are_put_in_their_places(tmp_path, base):
     """Over values that are there, or over zeros."""
-    file = plain_box()
+    file = gltf(BOX)
     rows = np.arange(3, 8) if base else np.arange(8)
     entry = file.header["accessors"][0]
     if base:
@@ -205,12 +194,11 @@ def test_sparse_positions_are_put_in_their_places(tmp_path, base):
         "indices": {"bufferView": file.view(rows.astype("<u1")), "componentType": 5121},
         "values": {"bufferView": file.view(np.asarray(BOX.vertices)[rows].astype("<f4"))},
     }
-    found = load_surface(file.written(tmp_path / "box.glb"))
-    assert same_triangles(found, BOX, 1e-7)
+    assert same_triangles(load_surface(file.written(tmp_path / "box.glb")), BOX, 1e-7)
 
 
 def test_fans_of_triangles_count_and_lines_do_not(tmp_path):
-    file = plain_box()
+    file = gltf(BOX)
     faces = np.asarray(BOX.faces)
     position = file.primitive["attributes"]["POSITION"]
     fans = [
@@ -218,18 +206,14 @@ def test_fans_of_triangles_count_and_lines_do_not(tmp_path):
         for face in faces[10:]
     ]
     file.primitive["indices"] = file.accessor(faces[:10].ravel(), 5123)
-    edges = {
-        "attributes": {"POSITION": position},
-        "mode": 1,
-        "indices": file.accessor(faces[0][:2], 5123),
-    }
+    edge = file.accessor(faces[0][:2], 5123)
+    edges = {"attributes": {"POSITION": position}, "mode": 1, "indices": edge}
     file.header["meshes"][0]["primitives"] += [*fans, edges]
-    found = load_surface(file.written(tmp_path / "box.gltf"))
-    assert same_triangles(found, BOX, 1e-7)
+    assert same_triangles(load_surface(file.written(tmp_path / "box.gltf")), BOX, 1e-7)
 
 
 def test_a_file_beside_it_may_have_a_name_with_spaces(tmp_path):
-    file = plain_box()
+    file = gltf(BOX)
     path = Path(file.written(tmp_path / "box.gltf"))
     (tmp_path / "my data.bin").write_bytes(bytes(file.data))
     text = path.read_text()
@@ -244,27 +228,23 @@ def test_a_file_beside_it_may_have_a_name_with_spaces(tmp_path):
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression", "X_any"],
 )
 def test_a_file_that_needs_what_is_not_read_is_refused(tmp_path, extension, ending):
-    file = plain_box()
+    file = gltf(BOX)
     file.header["extensionsRequired"] = ["KHR_materials_unlit", extension]
     with pytest.raises(UserError, match=f"needs {extension}, which is not read; export it without"):
         load_surface(file.written(tmp_path / f"box.{ending}"))
 
 
 def test_extensions_of_colours_are_no_hindrance(tmp_path):
-    file = plain_box()
-    names = [
-        "KHR_materials_unlit",
-        "KHR_texture_transform",
-        "EXT_texture_webp",
-        "KHR_mesh_quantization",
-    ]
+    file = gltf(BOX)
+    names = ["KHR_materials_unlit", "KHR_texture_transform", "EXT_texture_webp"]
+    names.append("KHR_mesh_quantization")
     file.header["extensionsRequired"] = names
     assert same_triangles(load_surface(file.written(tmp_path / "box.glb")), BOX, 1e-7)
 
 
 def test_positions_that_are_in_an_extension_alone_are_refused(tmp_path):
     """Though the file does not say that it needs it."""
-    file = plain_box()
+    file = gltf(BOX)
     del file.header["accessors"][0]["bufferView"]
     file.primitive["extensions"] = {"KHR_draco_mesh_compression": {}}
     with pytest.raises(UserError, match="no coordinates .* KHR_draco_mesh_compression"):
@@ -272,7 +252,7 @@ def test_positions_that_are_in_an_extension_alone_are_refused(tmp_path):
 
 
 def test_data_that_are_in_an_extension_alone_are_refused(tmp_path):
-    file = plain_box()
+    file = gltf(BOX)
     file.header["buffers"].append({"byteLength": 96})
     view = file.header["bufferViews"][0]
     view |= {"buffer": 1, "byteOffset": 0, "extensions": {"EXT_meshopt_compression": {}}}
@@ -289,7 +269,7 @@ def test_data_that_are_in_an_extension_alone_are_refused(tmp_path):
     ],
 )
 def test_a_mesh_that_something_deforms_is_refused(tmp_path, node, mesh, sentence):
-    file = plain_box()
+    file = gltf(BOX)
     file.header["nodes"][0] |= node
     file.header["meshes"][0] |= mesh
     with pytest.raises(UserError, match=sentence):
@@ -297,7 +277,7 @@ def test_a_mesh_that_something_deforms_is_refused(tmp_path, node, mesh, sentence
 
 
 def test_morph_targets_that_have_no_weight_do_not_matter(tmp_path):
-    file = plain_box()
+    file = gltf(BOX)
     file.header["nodes"][0] |= {"weights": [0.0]}
     file.header["meshes"][0] |= {"weights": [1.0]}
     assert same_triangles(load_surface(file.written(tmp_path / "box.glb")), BOX, 1e-7)

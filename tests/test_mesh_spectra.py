@@ -4,8 +4,6 @@ Mesh-free Rayleigh-Ritz of the free parallelepiped, 0.4 x 0.1 x 0.1 m of 1 GPa, 
 Poisson's ratio 0.25, gives 541.03 Hz for the first pair of bending modes.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from solver.analysis.library import solve

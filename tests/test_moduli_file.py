@@ -1,7 +1,5 @@
 """Materials from files: one positive real number per voxel, or one sentence."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

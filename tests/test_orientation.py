@@ -1,7 +1,5 @@
 """A solid is the same, however the faces and parts of its mesh are turned; or it is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -16,6 +14,7 @@ from tests.mesh_files import (
     both_ways,
     concatenated,
     inside_out,
+    merged,
     saved,
     soup,
     with_turned,
@@ -72,8 +71,7 @@ def test_faces_that_are_turned_against_their_neighbours_are_turned_back(numbers,
 
 
 def test_voxels_and_finite_cells_of_a_box_with_a_turned_face_are_those_of_the_box(tmp_path, caplog):
-    path = saved(with_turned(BOX, 4), tmp_path / "turned.ply")
-    found = load_surface(path)
+    found = load_surface(saved(with_turned(BOX, 4), tmp_path / "turned.ply"))
     assert "1 of 12 faces were turned" in caplog.text
     expected = load_surface(saved(BOX, tmp_path / "box.ply"))
     assert voxelize(found, 16).filled.all()
@@ -162,13 +160,6 @@ def mitred() -> list[trimesh.Trimesh]:
     ]
 
 
-def merged(surface: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The surface with one vertex at each place."""
-    surface = surface.copy()
-    surface.merge_vertices()
-    return surface
-
-
 def shuffled(surface: trimesh.Trimesh) -> trimesh.Trimesh:
     """The surface with its faces in another order."""
     faces = np.random.default_rng(1).permutation(np.asarray(surface.faces))
@@ -222,8 +213,7 @@ def test_of_some_faces_that_are_there_both_ways_one_stays(numbers, caplog):
 
 def test_a_wall_inside_a_solid_may_be_there_both_ways():
     """Two blocks that share a face are one solid with a wall that cancels."""
-    other = block((0.05, -0.05, -0.05), (0.2, 0.05, 0.05))
-    assert turned(concatenated(LEFT, other)) is None
+    assert turned(concatenated(LEFT, block((0.05, -0.05, -0.05), (0.2, 0.05, 0.05)))) is None
 
 
 def test_faces_that_cannot_be_turned_alike_are_refused(tmp_path):

@@ -1,10 +1,7 @@
 """Parameters that are declared once: construction, command lines, files, sentences."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -66,7 +63,7 @@ class Solid:
     named: dict[str, Weights] = option(dict, "weights by name")
 
 
-def test_construction_converts_numbers_of_numpy_and_lists() -> None:
+def test_construction_converts_numbers_of_numpy_and_lists():
     solid = Solid(np.int64(8), np.float32(2.0), points=[Point("a", [1, 2, 3])])  # type: ignore[arg-type]
     assert solid == Solid(resolution=8, density=2.0, points=(Point("a", (1.0, 2.0, 3.0)),))
     assert type(solid.resolution) is int and type(solid.density) is float
@@ -108,19 +105,19 @@ def test_construction_converts_numbers_of_numpy_and_lists() -> None:
         ({"named": {"a": {"frequency": "x"}}}, "named.a.frequency: found 'x', expected a number"),
     ],
 )
-def test_a_mistake_in_a_document_is_one_sentence(values: dict, sentence: str) -> None:
+def test_a_mistake_in_a_document_is_one_sentence(values, sentence):
     document = {"resolution": 8, **values} if values else {}
     with pytest.raises(ParameterError) as error:
         parameters_from(document, Solid)
     assert sentence in str(error.value)
 
 
-def test_a_document_may_write_whole_numbers_with_a_point() -> None:
+def test_a_document_may_write_whole_numbers_with_a_point():
     solid = parameters_from({"resolution": 8.0, "density": 7}, Solid)
     assert (solid.resolution, solid.density) == (8, 7.0)
 
 
-def test_a_mistake_in_a_file_is_told_with_its_line(tmp_path: Path) -> None:
+def test_a_mistake_in_a_file_is_told_with_its_line(tmp_path):
     file = tmp_path / "solid.yaml"
     file.write_text("resolution: 8\npoints:\n- name: a\n- name: b\n  at: [1, 2, x]\n")
     with pytest.raises(UserError, match=r"solid.yaml, line 5: points\[1\].at\[2\]: found 'x'"):
@@ -136,7 +133,7 @@ def _parsed(*words: str) -> Solid:
     return collect(Solid, parser.parse_args(words))
 
 
-def test_a_command_line_is_made_from_the_fields() -> None:
+def test_a_command_line_is_made_from_the_fields():
     solid = _parsed("--resolution", "8", "--modes", "3", "--lumped", "--seconds", "2")
     assert solid == Solid(8, modes=3, lumped=True, seconds=2.0)
     assert _parsed("--resolution", "8", "--modes", "auto") == Solid(8)
@@ -154,13 +151,13 @@ def test_a_command_line_is_made_from_the_fields() -> None:
         ("--resolution 8 --method fats", "invalid choice: 'fats', did you mean 'fast'?"),
     ],
 )
-def test_a_mistake_on_a_command_line_names_the_option(words: str, sentence: str) -> None:
+def test_a_mistake_on_a_command_line_names_the_option(words, sentence):
     with pytest.raises(UserError) as error:
         _parsed(*words.split())
     assert sentence in str(error.value)
 
 
-def test_help_shows_meanings_and_defaults() -> None:
+def test_help_shows_meanings_and_defaults():
     parser = argparse.ArgumentParser()
     add_options(parser, Solid, leave_out=("points", "weights", "named"))
     text = " ".join(parser.format_help().split())
@@ -168,7 +165,7 @@ def test_help_shows_meanings_and_defaults() -> None:
     assert "--method {fast,slow} how it is solved (default fast)" in text
 
 
-def test_fields_are_described() -> None:
+def test_fields_are_described():
     known = parameters_of(Solid)
     assert known["density"].domain.unit == "kg/m^3"
     assert known["density"].domain.limits == {"ge": 1e-3, "le": 1e6}
@@ -177,7 +174,7 @@ def test_fields_are_described() -> None:
     assert known["resolution"].default is REQUIRED
 
 
-def test_several_words_of_an_option_are_an_item_each() -> None:
+def test_several_words_of_an_option_are_an_item_each():
     parser = Parser()
     add_options(parser, ValidateOptions)
     given = parser.parse_args(["--out", "x", "--tolerances", "residual=1e-6", "response=2"])

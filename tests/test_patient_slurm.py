@@ -1,16 +1,13 @@
 """A SLURM that does not answer, answers late or forgets: its jobs are neither lost nor doubled."""
 
-from __future__ import annotations
-
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests import slurm_cluster, slurm_standin
-from tests.patience import HANG_SECONDS
+from tests.programs import python, run
 from tests.workflow_runs import CHECKOUT
 from workflow import patient_slurm, slurm_cleanup
 
@@ -31,12 +28,10 @@ def slurm(tmp_path):
         environment["PATH"] = f"{own}{os.pathsep}{environment['PATH']}"
         environment[patient_slurm.PAUSE] = "0.05"
 
-        def run(words: list[str]) -> subprocess.CompletedProcess[str]:
-            return subprocess.run(
-                words, env=environment, capture_output=True, text=True, timeout=HANG_SECONDS
-            )
+        def started(words: list[str]) -> subprocess.CompletedProcess[str]:
+            return run(*words, env=environment)
 
-        return folder, run
+        return folder, started
 
     return make
 
@@ -109,15 +104,10 @@ def test_a_run_ends_well_on_a_slurm_that_does_not(slurm, tmp_path):
     )
     shard = "results/dataset/uniform-0.h5"
     options = ["--profile", slurm_cluster.PROFILE, *slurm_cluster.QUICK, "--retries", "0"]
-    command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", *options]
-    done = subprocess.run(
-        [str(word) for word in (*command, shard, "--configfile", "config.yaml")],
-        cwd=tmp_path,
-        env={**environment, "PYTHONPATH": str(CHECKOUT), patient_slurm.PAUSE: "0.2"},
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
-    )
+    options += [shard, "--configfile", "config.yaml"]
+    variables = {**environment, "PYTHONPATH": str(CHECKOUT), patient_slurm.PAUSE: "0.2"}
+    snakefile = CHECKOUT / "Snakefile"
+    done = python("-m", "snakemake", "-s", snakefile, *options, cwd=tmp_path, env=variables)
     logs = "".join(log.read_text() for log in folder.glob("*.log"))
     assert done.returncode == 0, done.stdout + done.stderr + logs
     assert (tmp_path / shard).is_file() and jobs(folder) == 1

@@ -1,7 +1,5 @@
 """PETSc does not take a pipe that nobody reads any more for a crash."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -9,6 +7,7 @@ import sys
 import pytest
 
 from tests.patience import HANG_SECONDS
+from tests.programs import python
 
 MODES = ("modes", "builtin:box", "--resolution", "6", "--modes", "9", "--json", "--out", "box.h5")
 
@@ -35,7 +34,5 @@ def test_python_raises_what_it_does_without_petsc():
     program = "import os\nfrom carillon.processes.petsc import PETSc\nread, write = os.pipe()\n"
     program += "os.close(read)\ntry: os.write(write, b'x')\n"
     program += "except BrokenPipeError: print('told', PETSc.Sys.isInitialized())\n"
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=HANG_SECONDS
-    )
+    done = python("-c", program)
     assert done.stdout.strip() == "told True", done.stderr

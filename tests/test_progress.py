@@ -1,7 +1,5 @@
 """Progress: a bar on a terminal, a line a minute in a log file, nothing for short work."""
 
-from __future__ import annotations
-
 import io
 
 import pytest

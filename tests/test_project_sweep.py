@@ -1,8 +1,5 @@
 """Every key of a project with values of every kind: each is taken, or refused in one sentence."""
 
-from __future__ import annotations
-
-import asyncio
 import copy
 import json
 from collections.abc import Iterator
@@ -121,31 +118,27 @@ def test_a_project_is_taken_or_refused_in_one_sentence(tmp_path):
     assert taken > 50
 
 
-def test_the_studio_takes_settings_or_refuses_them_in_one_sentence(tmp_path):
+async def test_the_studio_takes_settings_or_refuses_them_in_one_sentence(tmp_path):
     """All that a page may send, and then the state is one that it can be told."""
     schema = schema_of(Project)
-
-    async def play() -> None:
-        studio, taken = open_studio("builtin:bar", tmp_path), 0
-        for path in keys(schema):
-            for value in VALUES:
-                settings = put({}, path, value) if path[0] not in ("mesh", "targets") else None
-                for each in (settings, {path[-1]: value} if len(path) == 1 else None):
-                    if each is None:
-                        continue
-                    try:
-                        await studio.call("change_settings", {"settings": each})
-                        json.dumps(studio.state(), allow_nan=False)
-                        await studio.call("undo", {})
-                        taken += 1
-                    except UserError as error:
-                        require_sentence(str(error))
-                    except Exception as error:
-                        raise AssertionError(f"{path}: {shown(value)}") from error
-        await studio.close()
-        assert taken > 50
-
-    asyncio.run(play())
+    studio, taken = open_studio("builtin:bar", tmp_path), 0
+    for path in keys(schema):
+        for value in VALUES:
+            settings = put({}, path, value) if path[0] not in ("mesh", "targets") else None
+            for each in (settings, {path[-1]: value} if len(path) == 1 else None):
+                if each is None:
+                    continue
+                try:
+                    await studio.call("change_settings", {"settings": each})
+                    json.dumps(studio.state(), allow_nan=False)
+                    await studio.call("undo", {})
+                    taken += 1
+                except UserError as error:
+                    require_sentence(str(error))
+                except Exception as error:
+                    raise AssertionError(f"{path}: {shown(value)}") from error
+    await studio.close()
+    assert taken > 50
 
 
 WRITTEN = {

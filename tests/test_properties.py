@@ -1,12 +1,10 @@
 """Whatever is read, the answer is content or one sentence: texts that people write."""
 
-from __future__ import annotations
-
 import argparse
 import copy
 import json
 import math
-from pathlib import Path
+from contextlib import contextmanager
 from typing import Annotated
 
 import numpy as np
@@ -40,12 +38,16 @@ TYPES = {
     "not negative": (reader(NonNegative), float, lambda value: 0.0 <= value < math.inf),
     "positive": (reader(Positive), float, lambda value: 0.0 < value < math.inf),
     "ratio": (reader(PoissonRatio), float, lambda value: -1.0 < value < 0.5),
-    "between": (
-        reader(Annotated[float, between(-2.0, 3.0)]),
-        float,
-        lambda value: -2.0 <= value <= 3.0,
-    ),
+    "between": (reader(BETWEEN), float, lambda value: -2.0 <= value <= 3.0),
 }
+
+
+@contextmanager
+def taken_or_refused():
+    try:
+        yield
+    except argparse.ArgumentTypeError as error:
+        assert str(error)
 
 
 @pytest.mark.parametrize("name", TYPES)
@@ -53,22 +55,16 @@ TYPES = {
 @given(text=NUMBERS)
 def test_a_number_is_in_its_range_or_refused(name, text):
     convert, kind, allowed = TYPES[name]
-    try:
+    with taken_or_refused():
         value = convert(text)
-    except argparse.ArgumentTypeError as error:
-        assert str(error)
-    else:
         assert type(value) is kind and allowed(value)
 
 
 @examples(150)
 @given(text=NUMBERS | st.lists(NUMBERS, max_size=3).map(",".join))
 def test_numbers_of_ranks_ascend_or_are_refused(text):
-    try:
+    with taken_or_refused():
         counts = rank_counts(text)
-    except argparse.ArgumentTypeError as error:
-        assert str(error)
-    else:
         assert counts and list(counts) == sorted(set(counts)) and counts[0] >= 1
 
 
@@ -89,11 +85,8 @@ def test_a_note_sounds_or_is_refused(text):
 @examples(15)
 @given(text=NUMBERS.map("residual=".__add__) | st.text(max_size=20))
 def test_a_tolerance_is_positive_or_refused(text):
-    try:
+    with taken_or_refused():
         name, value = _tolerance(text)
-    except argparse.ArgumentTypeError as error:
-        assert str(error)
-    else:
         assert name and 0.0 < value < math.inf
 
 
@@ -202,12 +195,6 @@ def test_the_memory_of_a_reader_is_bounded():
         or_refused(lambda: np.empty(1 << 33))
 
 
-def test_the_values_tried_are_real(tmp_path):
-    assert project_of(yaml.safe_load(PROJECT), clips_in(tmp_path)).modes == 6
+def test_the_values_tried_are_real(clips):
+    assert project_of(yaml.safe_load(PROJECT), clips).modes == 6
     completed(yaml.safe_load(CONFIGURATION))
-
-
-def clips_in(folder: Path) -> Path:
-    for target in yaml.safe_load(PROJECT)["targets"]:
-        (folder / target["clip"]).touch()
-    return folder

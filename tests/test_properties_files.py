@@ -1,7 +1,5 @@
 """Whatever is read, the answer is content or one sentence: bytes of files, damaged in every way."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -132,8 +130,7 @@ def test_a_damaged_journal_ends_in_the_same_shard_or_is_refused(data, begun, tmp
     content = data.draw(damaged(begun.journal))
     path.unlink(missing_ok=True)
     rewrite(journal_of(path), content)
-    fitted = or_refused(lambda: generate_file(path, begun.plan, begun.origin))
-    if fitted is None:
+    if or_refused(lambda: generate_file(path, begun.plan, begun.origin)) is None:
         assert journal_of(path).read_bytes() == content, "work that somebody may want was lost"
         assert not path.exists()
     else:

@@ -1,7 +1,5 @@
 """Coarse meshes of which some blocks stay fine: the fine model, the coarse one, or between both."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from itertools import combinations
@@ -28,8 +26,6 @@ from carillon.fem.geometry import (
 from carillon.fem.geometry.faces import boundary_faces, corner_values, face_neighbours
 from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
 from carillon.fem.laplacian import cell_laplacian
-from solver.analysis.modal_solver import modal_analysis
-from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
@@ -41,7 +37,7 @@ from solver.hcms.synthesis import synthesize
 from solver.response.points import interpolation
 from solver.verification.comparison import compare_files, on_mesh_of
 from tests import solids
-from tests.edited_files import edited
+from tests.edited_files import edited, put
 from tests.rank_counts import TO_THREE
 
 COMM = MPI.COMM_SELF
@@ -141,8 +137,7 @@ def test_mixed_meshes_are_consistent(seed):
     places = 2 * (mesh.grid >> 1)[:, None] + node_places()[mesh.kinds]
     assert np.array_equal(mesh.node_grid[mesh.cells], places)
     assert np.array_equal(np.unique(mesh.cells), np.arange(mesh.n_nodes))
-    keys = mesh.node_grid @ np.array([1, 100, 10_000])
-    assert (np.diff(keys) >= 0).all()
+    assert (np.diff(mesh.node_grid @ np.array([1, 100, 10_000])) >= 0).all()
     # Parts that stay whole are those of the coarse mesh, with the same contacts.
     part = {tuple(cells): bits for cells, bits in zip(plain.fine_of_block.tolist(), plain.contacts)}
     for cells, bits, own in zip(blocks.fine_of_block.tolist(), blocks.contacts, blocks.is_fine):
@@ -189,8 +184,7 @@ def test_elements_that_touch_by_a_face_are_neighbours(seed):
 
 
 def test_pieces_of_a_mixed_mesh_are_those_of_the_fine_one():
-    mesh = solids.bar_models()[1].mesh
-    assert connected_components(cell_laplacian(mesh))[0] == 1
+    assert connected_components(cell_laplacian(solids.bar_models()[1].mesh))[0] == 1
 
 
 # Matrices
@@ -231,8 +225,7 @@ def test_lumped_masses(seed):
     consistent = assembled(whole)[1]
     assert (lumped != sp.diags(lumped.diagonal())).nnz == 0 and lumped.diagonal().min() > 0.0
     assert_equal(lumped.diagonal(), np.asarray(consistent.sum(axis=1)).ravel())
-    shared = replace(whole, lumped_share=0.3)
-    same = (shared.nodal_mass() == whole.nodal_mass()).all(axis=(1, 2))
+    same = (replace(whole, lumped_share=0.3).nodal_mass() == whole.nodal_mass()).all(axis=(1, 2))
     assert np.array_equal(same, (whole.mesh.span == 1) | (whole.fill != 255))
 
 
@@ -288,8 +281,7 @@ def test_synthesis_bounds_a_mixed_spectrum_from_above(interface):
 def test_every_method_finds_the_modes_of_a_mixed_model(method):
     _, mixed, _ = solids.bar_models("fit")
     exact = solids.dense_eigenvalues(mixed)
-    options = SolverOptions(modes=30, method=method, subdomains=5, tolerance=1e-11)
-    values = modal_analysis(mixed, options, COMM).values
+    values = solids.analysed(mixed, modes=30, method=method, subdomains=5, tolerance=1e-11).values
     assert np.abs(values[6:] / exact[6:30] - 1.0).max() < 1e-9
 
 
@@ -299,8 +291,7 @@ def test_no_element_reaches_past_a_plane():
     places = local_mesh.lattice()[local_mesh.cells.corners]
     steps = local_mesh.cells.elements.steps
     assert (-(-places.max(axis=1) // steps) - places.min(axis=1) // steps <= 1).all()
-    lattice = mixed.mesh.node_grid[local_mesh.nodes]
-    assert np.array_equal(local_mesh.lattice(), lattice)
+    assert np.array_equal(local_mesh.lattice(), mixed.mesh.node_grid[local_mesh.nodes])
 
 
 # Points and files
@@ -310,11 +301,9 @@ def test_no_element_reaches_past_a_plane():
 def test_points_move_as_on_the_fine_mesh(seed):
     fine, refined, blocks = random_blocks(seed, whole_hinges=False)
     young = np.ones(fine.n_cells)
-    rng = np.random.default_rng(seed)
-    local = rng.uniform(0.01, 0.99, (fine.n_cells, 3))
+    local = np.random.default_rng(seed).uniform(0.01, 0.99, (fine.n_cells, 3))
     points = fine.origin + fine.edge * (fine.grid + local)
-    mixed = build_model(fine, young, make_coarsening("average"), refined)
-    found = interpolation(mixed, points)
+    found = interpolation(build_model(fine, young, make_coarsening("average"), refined), points)
     expected = interpolation(build_model(fine, young), points) @ prolongation(blocks)
     assert np.abs(found - expected).max() < 1e-13
 
@@ -364,15 +353,6 @@ def test_modes_of_another_mixed_mesh_start_nothing(files):
             modes_from_file(files["mixed"], model, 20, local_mesh, COMM)
 
 
-def other(name, change):
-    def edit(file):
-        values = file[name][()]
-        del file[name]
-        file[name] = change(values)
-
-    return edit
-
-
 def first_fine(values, value):
     """The value in place of the first cell that is fine and has one."""
     return np.where(np.arange(len(values)) == np.flatnonzero(values)[0], value, values)
@@ -381,17 +361,17 @@ def first_fine(values, value):
 EDITS = {
     "no span": lambda file: file.__delitem__("span"),
     "no hanging": lambda file: file.__delitem__("hanging"),
-    "spans of other cells": other("span", lambda values: values[1:]),
-    "real spans": other("span", lambda values: values.astype(float)),
-    "a span of three": other("span", lambda values: first_fine(values, 3)),
-    "fine cells for whole blocks": other("span", np.ones_like),
-    "whole blocks for fine cells": other("span", lambda values: np.full_like(values, 2)),
-    "a corner that is none": other("hanging", lambda values: first_fine(values.astype(int), 256)),
-    "a corner below zero": other("hanging", lambda values: first_fine(values.astype(int), -1)),
-    "the middle hangs": other("hanging", lambda values: first_fine(values, 255)),
-    "hanging corners of whole blocks": other("hanging", lambda values: values | 2),
-    "other corners hang": other("hanging", np.zeros_like),
-    "void octants of fine cells": other("fill", lambda values: np.full_like(values, 1)),
+    "spans of other cells": put("span", lambda values: values[1:]),
+    "real spans": put("span", lambda values: values.astype(float)),
+    "a span of three": put("span", lambda values: first_fine(values, 3)),
+    "fine cells for whole blocks": put("span", np.ones_like),
+    "whole blocks for fine cells": put("span", lambda values: np.full_like(values, 2)),
+    "a corner that is none": put("hanging", lambda values: first_fine(values.astype(int), 256)),
+    "a corner below zero": put("hanging", lambda values: first_fine(values.astype(int), -1)),
+    "the middle hangs": put("hanging", lambda values: first_fine(values, 255)),
+    "hanging corners of whole blocks": put("hanging", lambda values: values | 2),
+    "other corners hang": put("hanging", np.zeros_like),
+    "void octants of fine cells": put("fill", lambda values: np.full_like(values, 1)),
 }
 
 

@@ -1,7 +1,5 @@
 """What lines tell of a closed surface is what winding numbers tell, point by point."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

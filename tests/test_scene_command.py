@@ -1,7 +1,5 @@
 """`carillon scene` from a file to files."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -62,8 +60,7 @@ def test_the_same_scene_makes_the_same_files(folder, monkeypatch):
 
 def test_a_tune_strikes_its_bars_in_turn_in_time_and_in_tune():
     require_engine()
-    described = tune_of("C7 E7 G7")
-    bodies, impacts, _ = struck(described)
+    bodies, impacts, _ = struck(tune_of("C7 E7 G7"))
     on_bars = [
         contact.impact
         for contact in impacts

@@ -1,7 +1,5 @@
 """Convex parts fill the solid, leave its hollows free, and are cut once."""
 
-from __future__ import annotations
-
 from importlib import metadata
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -53,13 +51,13 @@ def volume(parts: list[np.ndarray], surface: trimesh.Trimesh) -> float:
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv("CARILLON_CACHE", str(tmp_path))
     return tmp_path / "convex"
 
 
 @pytest.mark.parametrize("name", ["frying-pan", pytest.param("cup", marks=pytest.mark.nightly)])
-def test_parts_fill_the_solid_and_leave_its_hollow_free(name: str) -> None:
+def test_parts_fill_the_solid_and_leave_its_hollow_free(name):
     surface = builtin_surface(name)
     parts = parts_of(surface)
     pieces = surface.split()
@@ -71,7 +69,7 @@ def test_parts_fill_the_solid_and_leave_its_hollow_free(name: str) -> None:
         assert len(ConvexHull(part).vertices) == len(part)
 
 
-def test_a_convex_solid_is_one_hull_and_needs_no_coacd(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_convex_solid_is_one_hull_and_needs_no_coacd(monkeypatch):
     def missing(name: str) -> str:
         raise metadata.PackageNotFoundError(name)
 
@@ -83,7 +81,7 @@ def test_a_convex_solid_is_one_hull_and_needs_no_coacd(monkeypatch: pytest.Monke
         parts_of(corner())
 
 
-def test_two_walls_are_two_parts_quietly(cache: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_two_walls_are_two_parts_quietly(cache, capfd):
     surface = corner()
     parts = parts_of(surface)
     assert capfd.readouterr() == ("", "")
@@ -91,9 +89,7 @@ def test_two_walls_are_two_parts_quietly(cache: Path, capfd: pytest.CaptureFixtu
     assert sum(ConvexHull(part).volume for part in parts) == pytest.approx(surface.volume, rel=1e-3)
 
 
-def test_what_was_cut_is_cached_and_cut_again_once_damaged(
-    cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_cut_is_cached_and_cut_again_once_damaged(cache, monkeypatch):
     first = parts_of(corner())
     (entry,) = cache.iterdir()
     whole = entry.read_bytes()
@@ -108,9 +104,7 @@ def test_what_was_cut_is_cached_and_cut_again_once_damaged(
     assert convex._read(entry)
 
 
-def test_parts_depend_on_what_was_asked_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_parts_depend_on_what_was_asked_alone(tmp_path, monkeypatch):
     surface = builtin_surface("bar")
     runs = []
     for name in ("one", "other"):
@@ -123,7 +117,7 @@ def test_parts_depend_on_what_was_asked_alone(
     assert len(list((tmp_path / "other" / "convex").iterdir())) == 2
 
 
-def test_a_hole_in_the_surface_is_no_hole_in_the_solid() -> None:
+def test_a_hole_in_the_surface_is_no_hole_in_the_solid():
     surface = corner()
     solid = surface.volume
     surface.update_faces(np.arange(len(surface.faces)) != 0)
@@ -133,7 +127,7 @@ def test_a_hole_in_the_surface_is_no_hole_in_the_solid() -> None:
     assert not within(parts, np.array([(0.08, 0.08, 0.015)])).any()
 
 
-def test_a_cavity_stays_empty() -> None:
+def test_a_cavity_stays_empty():
     shell = trimesh.creation.box((0.1, 0.1, 0.1))
     cavity = trimesh.creation.box((0.06, 0.06, 0.06))
     cavity.invert()
@@ -142,7 +136,7 @@ def test_a_cavity_stays_empty() -> None:
     assert volume(parts, shell) == pytest.approx(0.1**3 - 0.06**3, rel=0.1)
 
 
-def test_a_fine_surface_is_made_coarser_without_crossing_itself() -> None:
+def test_a_fine_surface_is_made_coarser_without_crossing_itself():
     fine = struck_surface("builtin:frying-pan").split()[0]  # its planes are cut finely, too
     coarse, preprocessing = cuttable.coarser(fine)
     assert preprocessing == "off" and coarse.is_volume
@@ -150,7 +144,7 @@ def test_a_fine_surface_is_made_coarser_without_crossing_itself() -> None:
     assert coarse.volume == pytest.approx(fine.volume, rel=1e-3)
 
 
-def test_surfaces_that_cross_themselves_are_told() -> None:
+def test_surfaces_that_cross_themselves_are_told():
     box = trimesh.creation.box((0.1, 0.1, 0.1))
     beside = box.copy().apply_translation((0.11, 0.012, 0.023))
     through = box.copy().apply_translation((0.06, 0.012, 0.023))
@@ -158,26 +152,26 @@ def test_surfaces_that_cross_themselves_are_told() -> None:
     assert cuttable.crosses_itself(box + through)
 
 
-def test_of_many_vertices_those_are_kept_that_matter() -> None:
+def test_of_many_vertices_those_are_kept_that_matter():
     sphere = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
     (part,) = parts_of(sphere)
     assert len(part) == MOST_VERTICES
     assert ConvexHull(part).volume > 0.9 * sphere.volume
 
 
-def test_no_finer_parts_are_asked_for_than_can_be_had() -> None:
+def test_no_finer_parts_are_asked_for_than_can_be_had():
     with pytest.raises(UserError, match=r"^concavity 0\.001: expected 0\.01 to 1$"):
         convex_parts(corner().vertices, corner().faces, concavity=0.001)
 
 
 @pytest.mark.parametrize("faces", [[(0, 1, 2)], []])
-def test_what_encloses_nothing_is_refused(faces: list[tuple[int, int, int]]) -> None:
+def test_what_encloses_nothing_is_refused(faces):
     vertices = np.array([(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0)])
     with pytest.raises(UserError, match="^the surface encloses nothing that 160 cells"):
         convex_parts(vertices, np.array(faces, dtype=int).reshape(-1, 3))
 
 
-def test_a_failure_of_coacd_is_one_sentence(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_of_coacd_is_one_sentence(cache, monkeypatch):
     def fails(command: list[str], environment: dict[str, str]) -> CompletedProcess[str]:
         return CompletedProcess(command, -6, "", "terminate called\n  what():  Wrong clip!\n")
 
@@ -194,7 +188,7 @@ def test_a_failure_of_coacd_is_one_sentence(cache: Path, monkeypatch: pytest.Mon
     ("name", "place"),
     [("vertices", (0, 0)), pytest.param("counts", 0, marks=pytest.mark.nightly)],
 )
-def test_hulls_that_nobody_cut_are_not_taken_from_the_cache(cache: Path, name, place) -> None:
+def test_hulls_that_nobody_cut_are_not_taken_from_the_cache(cache, name, place):
     surface = builtin_surface("slit-ring")
     first = parts_of(surface)
     (entry,) = cache.iterdir()

@@ -1,7 +1,5 @@
 """Films show and sound what a performance says, at the same time in both streams."""
 
-from __future__ import annotations
-
 import sys
 from fractions import Fraction
 from functools import lru_cache
@@ -97,8 +95,7 @@ def is_orange(pixels):
 def test_the_impact_is_seen_and_heard_at_the_same_time(film):
     times, frames = pictures(film)
     rows = is_orange(frames).any(axis=2)
-    lowest = np.array([np.flatnonzero(each).max(initial=-1) for each in rows])
-    seen = times[lowest.argmax()]
+    seen = times[np.array([np.flatnonzero(each).max(initial=-1) for each in rows]).argmax()]
     begin, sound, rate = heard(film)
     onset = begin + np.argmax(np.abs(sound[:, 0]) > 0.25) / rate
     frame = 1.0 / FRAMES_PER_SECOND
@@ -188,8 +185,7 @@ def ball_and_shadow(height: float, ground: float | None) -> tuple[np.ndarray, np
         for y in (0.0, -9.0)
     )
     own = is_orange(there)
-    rim = binary_dilation(own, iterations=2)
-    return own, ~rim & ((away - there).min(axis=2) > 12)
+    return own, ~binary_dilation(own, iterations=2) & ((away - there).min(axis=2) > 12)
 
 
 def test_solids_throw_shadows_on_the_ground_and_nowhere_without_it():

@@ -1,11 +1,6 @@
 """What other tools read from a scene in glTF: objects, their motion, a camera and the sound."""
 
-from __future__ import annotations
-
-import base64
 import io
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +10,15 @@ import soundfile
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from sound.export.gltf_buffer import UNSIGNED_INT
 from sound.export.scene_gltf import EXTENSION, write_scene_gltf
 from sound.scenes.performance import Performance
 from sound.scenes.picture import Appearance, Camera, Motion, Picture
+from tests.gltf_files import accessor, read_gltf
 
 STEPS, RATE = 41, 8000
 GROUND = -0.02
 UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the scene's axes to glTF's: z becomes y."""
-WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 KINDS = ["scene.gltf", "scene.glb"]
 
 
@@ -53,33 +47,11 @@ def performance(ground: float | None = GROUND) -> Performance:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("scene")
     for name in KINDS:
         write_scene_gltf(path / name, performance(), name.endswith(".glb"))
     return path
-
-
-def read_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
-    """JSON and buffer of either kind of file, by the specification."""
-    raw = path.read_bytes()
-    if path.suffix == ".gltf":
-        document = json.loads(raw)
-        return document, base64.b64decode(document["buffers"][0]["uri"].split(",", 1)[1])
-    magic, version, total, length, kind = struct.unpack("<4sIII4s", raw[:20])
-    assert (magic, version, total, kind) == (b"glTF", 2, len(raw), b"JSON")
-    data_length, kind = struct.unpack("<I4s", raw[20 + length : 28 + length])
-    assert kind == b"BIN\0" and 28 + length + data_length == total
-    return json.loads(raw[20 : 20 + length]), raw[28 + length :]
-
-
-def accessor(document: dict[str, Any], data: bytes, number: int) -> np.ndarray:
-    entry = document["accessors"][number]
-    view = document["bufferViews"][entry["bufferView"]]
-    kind = "<u4" if entry["componentType"] == UNSIGNED_INT else "<f4"
-    count = entry["count"] * WIDTHS[entry["type"]]
-    assert view["byteOffset"] % 4 == 0 and view["byteLength"] == 4 * count
-    return np.frombuffer(data, kind, count, view["byteOffset"]).reshape(entry["count"], -1)
 
 
 def animated(document: dict[str, Any], data: bytes, path: str) -> dict[str, np.ndarray]:
@@ -95,7 +67,7 @@ def animated(document: dict[str, Any], data: bytes, path: str) -> dict[str, np.n
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_file_keeps_to_the_specification(folder: Path, name: str) -> None:
+def test_the_file_keeps_to_the_specification(folder, name):
     document, data = read_gltf(folder / name)
     assert document["asset"]["version"] == "2.0"
     assert document["buffers"][0]["byteLength"] == len(data)
@@ -117,7 +89,7 @@ def test_the_file_keeps_to_the_specification(folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_objects_stand_where_they_begin(folder: Path, name: str) -> None:
+def test_objects_stand_where_they_begin(folder, name):
     played = performance().picture
     loaded = trimesh.load(folder / name)
     assert isinstance(loaded, trimesh.Scene)
@@ -134,7 +106,7 @@ def test_objects_stand_where_they_begin(folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_animation_is_the_motion(folder: Path, name: str) -> None:
+def test_the_animation_is_the_motion(folder, name):
     document, data = read_gltf(folder / name)
     played = performance().picture.motion
     (animation,) = document["animations"]
@@ -155,7 +127,7 @@ def test_the_animation_is_the_motion(folder: Path, name: str) -> None:
         assert ((turns[each][1:] * turns[each][:-1]).sum(axis=1) > 0.0).all()
 
 
-def test_the_camera_sees_what_it_looks_at_in_the_middle(folder: Path) -> None:
+def test_the_camera_sees_what_it_looks_at_in_the_middle(folder):
     document, _ = read_gltf(folder / "scene.glb")
     camera = performance().picture.camera
     (node,) = (node for node in document["nodes"] if "camera" in node)
@@ -171,7 +143,7 @@ def test_the_camera_sees_what_it_looks_at_in_the_middle(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("height", [3.0, -3.0])
-def test_a_camera_may_look_straight_up_or_down(tmp_path: Path, height: float) -> None:
+def test_a_camera_may_look_straight_up_or_down(tmp_path, height):
     given = performance()
     camera = Camera((0.0, 0.0, height), (0.0, 0.0, 0.0))
     picture = Picture(given.picture.objects, given.picture.motion, None, camera)
@@ -182,14 +154,13 @@ def test_a_camera_may_look_straight_up_or_down(tmp_path: Path, height: float) ->
     np.testing.assert_allclose(turn.apply([0.0, 0.0, -1.0]), [0.0, 0.0, -height / 3.0], atol=1e-9)
 
 
-def test_the_ground_is_a_square_that_faces_up(folder: Path, tmp_path: Path) -> None:
+def test_the_ground_is_a_square_that_faces_up(folder, tmp_path):
     document, data = read_gltf(folder / "scene.glb")
     (node,) = (node for node in document["nodes"] if node["name"] == "ground")
     assert node["translation"] == [0.0, 0.0, GROUND]
     (surface,) = document["meshes"][node["mesh"]]["primitives"]
     corners = accessor(document, data, surface["attributes"]["POSITION"])
-    faces = accessor(document, data, surface["indices"]).reshape(-1, 3)
-    square = trimesh.Trimesh(corners, faces)
+    square = trimesh.Trimesh(corners, accessor(document, data, surface["indices"]).reshape(-1, 3))
     np.testing.assert_allclose(square.face_normals, [(0.0, 0.0, 1.0)] * 2)
     assert square.area > 100.0
     write_scene_gltf(tmp_path / "flying.glb", performance(ground=None), True)
@@ -197,7 +168,7 @@ def test_the_ground_is_a_square_that_faces_up(folder: Path, tmp_path: Path) -> N
     assert [node["name"] for node in document["nodes"][1:]] == ["box", "ball", "camera"]
 
 
-def test_colours_are_linear(folder: Path) -> None:
+def test_colours_are_linear(folder):
     document, _ = read_gltf(folder / "scene.gltf")
     box, ball = (document["materials"][n]["pbrMetallicRoughness"] for n in range(2))
     np.testing.assert_allclose(box["baseColorFactor"], [1.0, 0.2140, 0.0, 1.0], atol=1e-4)
@@ -205,7 +176,7 @@ def test_colours_are_linear(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_sound_is_that_of_the_scene(folder: Path, name: str) -> None:
+def test_the_sound_is_that_of_the_scene(folder, name):
     document, data = read_gltf(folder / name)
     assert document["extensionsUsed"] == [EXTENSION]
     sound = document["extensions"][EXTENSION]
@@ -225,6 +196,6 @@ def test_the_sound_is_that_of_the_scene(folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_file_is_the_same_again(folder: Path, tmp_path: Path, name: str) -> None:
+def test_the_file_is_the_same_again(folder, tmp_path, name):
     write_scene_gltf(tmp_path / name, performance(), name.endswith(".glb"))
     assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()

@@ -1,7 +1,5 @@
 """Named materials: every one is physical, says where its numbers are from, and is found by name."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 
 from carillon.errors import UserError
 from carillon.limits import require_constants
-from sound.scenes.materials import MATERIALS, NamedMaterial, named_material
+from sound.scenes.materials import MATERIALS, named_material
 
 LOCKING = 0.45
 """Poisson's ratio above which trilinear elements are too stiff to be of use."""
@@ -39,7 +37,7 @@ every = pytest.mark.parametrize(
 
 
 @every
-def test_numbers_are_finite_and_within_physical_bounds(material: NamedMaterial) -> None:
+def test_numbers_are_finite_and_within_physical_bounds(material):
     require_constants(material.poisson, material.density)
     assert 0.0 < material.poisson <= LOCKING
     assert SPEEDS[0] < math.sqrt(material.young / material.density) < SPEEDS[1]
@@ -53,7 +51,7 @@ def test_numbers_are_finite_and_within_physical_bounds(material: NamedMaterial) 
 
 
 @every
-def test_every_number_has_a_source(material: NamedMaterial) -> None:
+def test_every_number_has_a_source(material):
     heads = [sentence.split(":")[0] for sentence in material.source.split(". ") if ":" in sentence]
     named = {name for head in heads for name in head.split(", ")}
     expected = {"young", "poisson", "density", "alpha", "beta"}
@@ -61,25 +59,25 @@ def test_every_number_has_a_source(material: NamedMaterial) -> None:
     assert material.about
 
 
-def test_the_ordinary_materials_are_there() -> None:
+def test_the_ordinary_materials_are_there():
     assert set(MATERIALS) >= EXPECTED
 
 
 @pytest.mark.parametrize("name", LOSS_FACTORS)
-def test_damping_fits_the_loss_factor_and_is_least_at_1_khz(name: str) -> None:
+def test_damping_fits_the_loss_factor_and_is_least_at_1_khz(name):
     loss = named_material(name).loss_factor
     assert loss(1000.0) == pytest.approx(LOSS_FACTORS[name], rel=5e-3)
     # Both terms are equal there but for rounding to three digits: the minimum is flat.
     assert min(loss(500.0), loss(2000.0)) == pytest.approx(1.25 * loss(1000.0), rel=5e-3)
 
 
-def test_damping_is_what_the_solver_takes() -> None:
+def test_damping_is_what_the_solver_takes():
     steel = named_material("steel")
     (rate,) = steel.damping.decay_per_second(np.array([(2000.0 * math.pi) ** 2]))
     assert rate == pytest.approx(math.pi * 1000.0 * steel.loss_factor(1000.0))
 
 
-def test_an_unknown_name_is_refused_with_the_known_ones_and_the_closest() -> None:
+def test_an_unknown_name_is_refused_with_the_known_ones_and_the_closest():
     with pytest.raises(UserError) as refusal:
         named_material("aluminum")
     said = str(refusal.value)
@@ -87,6 +85,6 @@ def test_an_unknown_name_is_refused_with_the_known_ones_and_the_closest() -> Non
     assert said.endswith("; did you mean aluminium?")
 
 
-def test_a_name_like_no_other_gets_no_guess() -> None:
+def test_a_name_like_no_other_gets_no_guess():
     with pytest.raises(UserError, match="there is no material 'xyzzy', only [a-z, ]+$"):
         named_material("xyzzy")

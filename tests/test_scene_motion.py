@@ -1,7 +1,6 @@
 """How bodies of a scene move and strike each other, beside theory."""
 
-from __future__ import annotations
-
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +15,7 @@ from sound.scenes.performance import GROUND
 from tests.scenes import ball, moved, require_engine, scene, struck
 
 G = 9.81
+BLOCK = {"name": "block", "mesh": "builtin:box", "material": "wood", "count": 0, "resolution": 12}
 
 
 @pytest.fixture(autouse=True)
@@ -92,8 +92,7 @@ def test_impacts_are_told_with_their_pair_place_and_direction():
 
 
 def test_what_lands_presses_with_its_weight_and_then_sleeps():
-    block = {"name": "block", "mesh": "builtin:box", "material": "wood", "count": 0}
-    described = scene({**block, "resolution": 12, "position": [0, 0, 0.2]}, seconds=2.0)
+    described = scene({**BLOCK, "position": [0, 0, 0.2]}, seconds=2.0)
     (body,), impacts, (sustained,) = struck(described)
     assert sustained.pair == (0, GROUND)
     steps = sustained.contacts.steps
@@ -105,24 +104,13 @@ def test_what_lands_presses_with_its_weight_and_then_sleeps():
 
 
 def test_sliding_is_slowed_by_friction():
-    block = {"name": "block", "mesh": "builtin:box", "material": "wood", "count": 0}
-    first = scene({**block, "resolution": 12, "position": [0, 0, 1]}, seconds=0.01)
-    bodies, _ = moved(first)
+    bodies, _ = moved(scene({**BLOCK, "position": [0, 0, 1]}, seconds=0.01))
     half = -float(bodies[0].shape.vertices[:, 2].min())
-    described = scene(
-        {
-            **block,
-            "resolution": 12,
-            "position": [0, 0, half],
-            "velocity": [1, 0, 0],
-            "friction": 0.3,
-        },
-        seconds=1.0,
-    )
+    given = {"position": [0, 0, half], "velocity": [1, 0, 0], "friction": 0.3}
+    described = scene({**BLOCK, **given}, seconds=1.0)
     (body,), course = moved(described)
     friction = max(0.3, described.ground_material.friction)
-    slid = course.motion.positions[-1, 0, 0]
-    assert slid == pytest.approx(1.0 / (2 * friction * G), rel=0.05)
+    assert course.motion.positions[-1, 0, 0] == pytest.approx(1.0 / (2 * friction * G), rel=0.05)
 
 
 def test_hertz_contact_lasts_as_long_as_its_equation_of_motion_says():
@@ -179,13 +167,8 @@ def test_a_start_at_which_two_overlap_is_refused():
 
 
 def bowl(height):
-    return {
-        "name": "bowl",
-        "mesh": "builtin:bowl",
-        "material": "steel",
-        "count": 0,
-        "position": [0, 0, height],
-    }
+    given = {"name": "bowl", "mesh": "builtin:bowl", "material": "steel", "count": 0}
+    return {**given, "position": [0, 0, height]}
 
 
 def test_a_bowl_that_overlaps_the_ground_a_little_is_lifted_and_rests(capsys):
@@ -254,8 +237,6 @@ def test_a_start_without_overlap_is_left_as_it_is():
 
 def _with_ground(described, restitution):
     """The same on a ground that leaves a bounce as much."""
-    from dataclasses import replace
-
     material = replace(described.ground_material, restitution=restitution)
     return replace(described, ground_material=material)
 

@@ -1,7 +1,5 @@
 """Meshes of scenes as solids: their modes beside theory, which way is up, what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh
@@ -188,8 +186,7 @@ class TestUp:
         plain = body(**self.given(tmp_path, "obj"), count=4)
         assert turned.solid.frequencies == pytest.approx(plain.solid.frequencies, rel=1e-6)
         # The first bends the bar across its thickness, which is z now.
-        at = np.array([[0.2, 0.05, 0.01]])
-        moved = turned.motion(at)[0, :, 0]
+        moved = turned.motion(np.array([[0.2, 0.05, 0.01]]))[0, :, 0]
         assert np.abs(moved).argmax() == 2
         own = plain.motion(np.array([[0.2, 0.01, -0.05]]))[0, :, 0]
         assert abs(moved[2]) == pytest.approx(abs(own[1]), rel=1e-3)

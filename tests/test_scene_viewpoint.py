@@ -1,7 +1,5 @@
 """Cameras that no scene describes see what happens, near enough to tell what it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -34,12 +32,11 @@ def window(camera: Camera, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
     seen = (places - view.eye) @ view.axes.T
     middles, halves = seen[:, :2] / seen[:, 2:], radii / seen[:, 2]
     low, high = middles - halves[:, None], middles + halves[:, None]
-    ends = np.stack([low.min(axis=0), high.max(axis=0)])
-    return (ends * view.focus / SIZE + 0.5).T.ravel()
+    return (np.stack([low.min(axis=0), high.max(axis=0)]) * view.focus / SIZE + 0.5).T.ravel()
 
 
 @pytest.mark.parametrize("along", ALONG)
-def test_all_is_seen_and_nearly_fills_the_picture(along: str) -> None:
+def test_all_is_seen_and_nearly_fills_the_picture(along):
     places = np.linspace(-0.6, 0.6, COUNT)[:, None] * ALONG[along] + [3.0, 1.0, 2.0]
     camera = camera_of(SCENE.camera, bodies_of(SCENE.objects), motion(np.stack([places, places])))
     left, right, top, bottom = window(camera, places, RADII)
@@ -49,7 +46,7 @@ def test_all_is_seen_and_nearly_fills_the_picture(along: str) -> None:
     assert first + last == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_rolls_far_away_makes_the_others_no_smaller() -> None:
+def test_what_rolls_far_away_makes_the_others_no_smaller():
     places = np.linspace(-0.6, 0.6, COUNT)[:, None] * ALONG["wide"]
     staying = np.stack([places] * 20)
     leaving = staying.copy()
@@ -59,7 +56,7 @@ def test_what_rolls_far_away_makes_the_others_no_smaller() -> None:
     assert far == near
 
 
-def test_who_hears_is_where_the_camera_is() -> None:
+def test_who_hears_is_where_the_camera_is():
     places = np.linspace(-0.6, 0.6, COUNT)[:, None] * ALONG["wide"]
     camera = camera_of(SCENE.camera, bodies_of(SCENE.objects), motion(np.stack([places, places])))
     head = head_of(SCENE.listener, camera)

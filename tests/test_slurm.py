@@ -1,7 +1,5 @@
 """On a real SLURM: the same bits as anywhere else, and nothing that a cluster does loses work."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -19,7 +17,6 @@ from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import read_modes
 from tests import slurm_cluster, workflow_runs
 from tests.patience import HANG_SECONDS, wait_for, words_of
-from tests.slurm_cluster import Cluster
 from tests.workflow_runs import CHECKOUT
 from workflow import slurm_cleanup
 from workflow.commands.digest import digest
@@ -124,7 +121,7 @@ def test_array_by_hand_yields_identical_shards(cluster, remote, tmp_path):
         assert digest(tmp_path / Path(file).name) == digest(remote / file)
 
 
-def test_jobs_of_a_killed_run_are_cancelled_by_the_next(cluster: Cluster, tmp_path):
+def test_jobs_of_a_killed_run_are_cancelled_by_the_next(cluster, tmp_path):
     """Its job hangs; the next run's own goes on from the journal, and nobody else's ends."""
     (tmp_path / "config.yaml").write_text(LONG.format(samples=SAMPLES))
     shard = tmp_path / DATASET[0]
@@ -180,7 +177,7 @@ def worker(shard: Path) -> int | None:
     return None
 
 
-def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
+def test_a_job_outlives_all_that_befalls_it(cluster, tmp_path):
     """Out of memory, a dead node, a controller that is away, a stuck process, a time limit."""
     (tmp_path / "config.yaml").write_text(LONG.format(samples=LONG_SAMPLES))
     shard = tmp_path / DATASET[0]
@@ -215,8 +212,7 @@ def test_a_job_outlives_all_that_befalls_it(cluster: Cluster, tmp_path):
     except AssertionError as error:
         run.kill()
         raise AssertionError((tmp_path / "snakemake.log").read_text()[-6000:]) from error
-    output = finish(run, tmp_path)
-    assert len(re.findall(r"submitted with SLURM jobid", output)) == 3
+    assert len(re.findall(r"submitted with SLURM jobid", finish(run, tmp_path))) == 3
     undisturbed = tmp_path / "undisturbed.h5"
     subprocess.run(
         [sys.executable, "-m", "dataset_gen", "generate", "--samples", str(LONG_SAMPLES)]

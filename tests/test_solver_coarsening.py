@@ -1,7 +1,5 @@
 """The coarse model: mass, stiffness bounds, and spectra near the fine one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as la

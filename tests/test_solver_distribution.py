@@ -1,7 +1,5 @@
 """Every rank holds its share of the solid, and the shares give what the whole would give."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

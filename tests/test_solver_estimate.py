@@ -1,7 +1,5 @@
 """Expected errors of coarse models, and models that are refined until they are small."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -15,7 +13,6 @@ from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, fine_model
 from solver.__main__ import main
 from solver.analysis.coarse_start import prolonged
-from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
@@ -30,6 +27,7 @@ from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_ERROR, RefinementOptions
 from solver.refinement.refined_model import RefinedModel
 from solver.refinement.work import analysis_work, is_followed, variation
+from tests import solids
 from tests.rank_counts import SEVERAL, TO_THREE
 
 COMM = MPI.COMM_SELF
@@ -37,7 +35,7 @@ COMM = MPI.COMM_SELF
 
 def solved(model, modes=60):
     """Modes of a model, by SLEPc."""
-    return modal_analysis(model, SolverOptions(method="slepc", modes=modes), COMM)
+    return solids.analysed(model, method="slepc", modes=modes)
 
 
 def whole(modes):
@@ -100,8 +98,7 @@ def test_nothing_is_missed_where_all_is_fine():
     refined = RefinedModel(problem.model, make_coarsening("ddfem"))
     refined.refine_all()
     blocks, coarse = refined.blocks, refined.model
-    modes = solved(coarse, 40)
-    estimate = estimated(problem.model, blocks, modes)
+    estimate = estimated(problem.model, blocks, solved(coarse, 40))
     assert np.abs(estimate.errors.errors).max() < 1e-6 and estimate.fine.missed == 0
     values = estimate.fine.values[:34]
     vectors = np.ascontiguousarray(estimate.fine.vectors[:, :34])
@@ -132,8 +129,7 @@ def test_energies_scale_with_the_modulus():
 
 
 def test_excess_counts_the_rms_and_a_third_of_the_worst():
-    even = ExpectedErrors(np.array([0.1, -0.1]))
-    assert even.excess(0.1) == pytest.approx(1.0)
+    assert ExpectedErrors(np.array([0.1, -0.1])).excess(0.1) == pytest.approx(1.0)
     spiked = ExpectedErrors(np.array([0.0] * 99 + [-0.6]))
     assert spiked.excess(0.1) == pytest.approx(2.0)
     assert (spiked.worst, spiked.worst_mode) == (-0.6, 106)
@@ -361,12 +357,3 @@ def test_what_is_allowed_if_nothing_is_said(coarsen, given, tolerance):
 def test_a_fine_mesh_is_not_refined():
     with pytest.raises(UserError, match="--coarsen ddfem"):
         RefinementOptions(0.05).tolerance("none")
-
-
-@pytest.mark.parametrize("wrong", ["-0.1", "nan", "much", "11"])
-def test_bad_errors_are_refused(wrong, tmp_path, capsys):
-    out = tmp_path / "modes.h5"
-    command = ["modes", "builtin:fork", "--resolution", "24", "--coarsen", "ddfem"]
-    assert main([*command, "--refine-to", wrong, "--out", str(out)]) == 2
-    assert "--refine-to" in capsys.readouterr().err
-    assert not out.exists()

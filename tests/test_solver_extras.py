@@ -1,7 +1,5 @@
 """What is computed besides the modes never takes them along when it fails."""
 
-from __future__ import annotations
-
 import pytest
 from mpi4py import MPI
 

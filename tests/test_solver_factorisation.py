@@ -1,7 +1,5 @@
 """A factorisation succeeds, or is known not to have."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -1,7 +1,5 @@
 """Which forests `ddfem` takes: those that are named, or those that come with the package."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 

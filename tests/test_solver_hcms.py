@@ -1,7 +1,5 @@
 """Merge tree, partition and groups of the component mode synthesis."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np
@@ -98,16 +96,14 @@ def test_part_that_gets_no_node_vanishes():
     # One cell in the middle of another part is outvoted at each of its corners.
     cell_part[inner] = 1
     cell_part[mesh.grid[:, 2] == 3] = 2
-    node_part = partition_nodes(mesh.cells, mesh.n_nodes, cell_part)
-    assert sorted(np.unique(node_part)) == [0, 1]
+    assert sorted(np.unique(partition_nodes(mesh.cells, mesh.n_nodes, cell_part))) == [0, 1]
 
 
 def ends_and_middle(length: int, end: int) -> tuple:
     """A bar whose two ends of `end` cells are one part."""
     mesh = solids.box_mesh(2, 2, length)
     place = mesh.node_grid[:, 2]
-    node_part = ((place > end) & (place < length - end)).astype(np.int32)
-    return mesh, node_part
+    return mesh, ((place > end) & (place < length - end)).astype(np.int32)
 
 
 def test_small_piece_of_a_subdomain_goes_to_its_neighbour():
@@ -138,8 +134,7 @@ def test_piece_that_hangs_by_two_nodes_is_apart():
 def test_default_partition_hangs_together():
     model = solids.uniform_box(14, 11, 9, 0.01)
     node_part = decomposition.partition_model(model, 9)
-    pieces = subdomain_pieces(model.mesh.cells, node_part)
-    assert pieces.max() == node_part.max()
+    assert subdomain_pieces(model.mesh.cells, node_part).max() == node_part.max()
 
 
 def test_default_partition_has_a_subdomain_for_every_rank():
@@ -162,8 +157,7 @@ def test_all_rigid_motions_of_a_subdomain_in_pieces_are_kept(in_pieces):
     local_mesh = distribute(in_pieces, comm=COMM)
     part = int(np.argmax(np.diff(local_mesh.decomposition.offsets)))
     cells = local_mesh.cells.take(local_mesh.cells_by_subdomain(range(part, part + 1))[part])
-    subdomain = make_subdomains(local_mesh, "free", COMM)[part]
-    values, vectors = subdomain.modes(cells.elements, 3)
+    values, vectors = make_subdomains(local_mesh, "free", COMM)[part].modes(cells.elements, 3)
     assert len(values) == vectors.shape[1] > 12
     assert (np.abs(values[:12]) < 1e-9 * values[-1]).all()
     assert values[12] > 1e-6 * values[-1]
@@ -190,13 +184,9 @@ def test_local_modes_are_good_for_smooth_motions_of_any_material(share_of_modes)
     error = values[6:] / exact[6:count] - 1.0
     assert (error > -1e-10).all()
     assert np.median(error) < 0.1
-    gram = vectors.T @ assembled_mass(model, local_mesh) @ vectors
-    assert np.abs(gram - np.eye(count)).max() < 1e-11
-
-
-def assembled_mass(model, local_mesh):
     order = degrees_of_freedom(local_mesh.nodes)
-    return assembled(model)[1][order][:, order]
+    gram = vectors.T @ assembled(model)[1][order][:, order] @ vectors
+    assert np.abs(gram - np.eye(count)).max() < 1e-11
 
 
 def test_overlapping_subdomains_give_better_values_than_free_ones_and_these_than_fixed():
@@ -233,8 +223,7 @@ def test_rigid_motions_are_kept_of_the_smallest_group():
 
 
 def test_boundary_and_interface_are_those_of_the_whole_mesh():
-    model = solids.random_box(8, 6, 5)
-    local_mesh = distribute(model, 6, comm=COMM)
+    local_mesh = distribute(solids.random_box(8, 6, 5), 6, comm=COMM)
     merges, ranges = local_mesh.decomposition.tree.merges, local_mesh.decomposition.row_ranges()
     everything = local_mesh.cells
     for step in merges:

@@ -1,7 +1,5 @@
 """The solver called from Python, and starts from earlier results."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -81,8 +79,7 @@ def test_coarse_moduli_may_be_zero_but_not_negative():
     moduli = model.young.copy()
     moduli[0, :2] = 0.0
     exact = solids.dense_eigenvalues(replace(model, young=moduli))[6:20]
-    found = prepared.solve_coarse(moduli).values[6:]
-    assert np.abs(found / exact - 1.0).max() < 1e-5
+    assert np.abs(prepared.solve_coarse(moduli).values[6:] / exact - 1.0).max() < 1e-5
     for wrong, sentence in ((-moduli, "are negative"), (moduli[:, 0], r"expected \(36, 8\)")):
         with pytest.raises(UserError, match=f"coarse moduli: .*{sentence}"):
             prepared.solve_coarse(wrong)
@@ -131,6 +128,5 @@ def test_petsc_options_reach_slepc_and_strangers_are_refused(tmp_path, run_cli):
 
 def test_ghost_of_an_eigenvalue_is_proven_absent_for_corrected_modes():
     model = solids.random_box(8, 5, 4)
-    options = SolverOptions(modes=30, check_inertia=True, tolerance=1e-9)
-    evidence = ModalSolver(model, options, COMM).solve().evidence
+    evidence = solids.analysed(model, modes=30, check_inertia=True, tolerance=1e-9).evidence
     assert evidence["inertia_count"] == evidence["inertia_expected"] >= 30

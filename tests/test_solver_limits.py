@@ -1,7 +1,5 @@
 """What no machine could bear, or no number hold, is refused before anything is done about it."""
 
-from __future__ import annotations
-
 import os
 import struct
 
@@ -20,6 +18,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.linear import petsc_options
 from studies.scaling.launch import require_ranks
+from tests import solids
 
 BOX = trimesh.creation.box()
 OBJ = BOX.export(file_type="obj")
@@ -153,8 +152,7 @@ def test_solids_at_the_limits_are_solved_as_others_are(unit, density, young):
     def frequencies(edge, young, density):
         cells = hexmesh_from_grid(grid, np.zeros(3), edge)
         model = fine_model(cells, np.full(cells.n_cells, young), density=density)
-        options = SolverOptions(modes=12, method="slepc")
-        return np.sqrt(ModalSolver(model, options, MPI.COMM_SELF).solve().values[6:])
+        return np.sqrt(solids.analysed(model, modes=12, method="slepc").values[6:])
 
     scale = np.sqrt(young / density) / unit
     expected = frequencies(1.0, 1.0e9, 1.0e3) / np.sqrt(1e6)
@@ -189,8 +187,7 @@ def test_options_that_are_not_for_this_program_are_refused(text):
 
 
 def test_options_that_petsc_never_asked_for_are_known():
-    text = "-carillon_test_used -3 -carillon_test_misspelt -1e-3"
-    petsc_options.insert_options(text)
+    petsc_options.insert_options("-carillon_test_used -3 -carillon_test_misspelt -1e-3")
     options = PETSc.Options()
     try:
         assert options.getInt("carillon_test_used") == -3

@@ -1,7 +1,5 @@
 """The solver on several ranks: the same result, and no rank left waiting after an error."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -94,8 +92,7 @@ def test_ground_truth_in_parallel(ranks, truth, tmp_path, mpiexec):
     ],
 )
 def test_bad_input_ends_all_ranks_with_one_sentence(arguments, sentence, tmp_path, mpiexec):
-    out = tmp_path / "modes.h5"
-    done = mpiexec(3, "solver", "modes", *arguments, "--out", out)
+    done = mpiexec(3, "solver", "modes", *arguments, "--out", tmp_path / "modes.h5")
     assert done.returncode == 2
     lines = [line for line in done.stderr.splitlines() if line.startswith("solver modes:")]
     assert len(lines) == 1

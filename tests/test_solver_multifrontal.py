@@ -1,7 +1,5 @@
 """Nested dissection and the multifrontal solver against a direct solve by scipy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -32,8 +30,7 @@ def two_bars():
     near = np.stack(np.meshgrid(range(6), range(2), range(2), indexing="ij"), axis=-1).reshape(
         -1, 3
     )
-    grid = np.concatenate([near, near + [0, 0, 6]])
-    return solids.hexmesh_from_grid(grid, np.zeros(3), 0.01)
+    return solids.hexmesh_from_grid(np.concatenate([near, near + [0, 0, 6]]), np.zeros(3), 0.01)
 
 
 MESHES = {

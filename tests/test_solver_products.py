@@ -1,7 +1,5 @@
 """Products of a rank's rows with blocks of vectors of any width, against scipy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -1,7 +1,5 @@
 """Modes from random vectors: expected eigenvalues, the shift, both iterations, the proof."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -63,7 +61,7 @@ def box():
 @pytest.mark.parametrize("material", ["uniform", "two-region", "random"])
 def test_eigenvalues_lie_about_where_they_are_expected(name, material):
     model = built_in(name, material)
-    found = ModalSolver(model, SolverOptions(modes=100, tolerance=1e-3), COMM).solve().values
+    found = solids.analysed(model, modes=100, tolerance=1e-3).values
     for number in (30, 99):
         expected = CountingLaw.of_solid(model, model.young, number).eigenvalue(number)
         assert 1.0 / FACTOR < expected / found[number] < FACTOR
@@ -103,8 +101,9 @@ def test_inertia_counts_eigenvalues_with_and_without_a_factor_to_keep(box, share
 @pytest.mark.parametrize("method", ["lanczos", "lobpcg"])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-6])
 def test_modes_are_as_accurate_as_asked_and_proven(box, method, tolerance):
-    options = SolverOptions(modes=46, tolerance=tolerance, method=method, check_inertia=True)
-    found = ModalSolver(box.model, options, COMM).solve()
+    found = solids.analysed(
+        box.model, modes=46, tolerance=tolerance, method=method, check_inertia=True
+    )
     error = found.values[RIGID_MODES:] / box.exact[:40] - 1.0
     assert -1e-9 < error.min() <= error.max() <= tolerance
     assert found.evidence["method"] == method
@@ -114,7 +113,7 @@ def test_modes_are_as_accurate_as_asked_and_proven(box, method, tolerance):
 
 def test_symmetric_solids_keep_all_copies():
     cube = Case(solids.uniform_box(7, 7, 7, 0.01))
-    found = ModalSolver(cube.model, SolverOptions(modes=60, tolerance=1e-8), COMM).solve()
+    found = solids.analysed(cube.model, modes=60, tolerance=1e-8)
     assert np.abs(found.values[RIGID_MODES:] / cube.exact[:54] - 1.0).max() <= 1e-8
 
 
@@ -134,8 +133,7 @@ def test_conjugate_gradients_find_nearly_all_modes_of_a_tiny_solid(modes, inerti
     tiny = Case(solids.uniform_box(5, 2, 1, 0.01, 1e9))
     assert tiny.system.n_dofs == 108
     modes = min(modes, 108)
-    options = SolverOptions(modes=modes, method="lobpcg", check_inertia=inertia)
-    found = ModalSolver(tiny.model, options, COMM).solve()
+    found = solids.analysed(tiny.model, modes=modes, method="lobpcg", check_inertia=inertia)
     expected = tiny.exact[: modes - RIGID_MODES]
     np.testing.assert_allclose(found.values[RIGID_MODES:], expected, rtol=1e-7)
 
@@ -166,7 +164,7 @@ def test_blocks_of_a_basis_are_one_matrix(box, threads, columns):
 
 def test_what_no_memory_holds_is_left_to_multigrid(box, monkeypatch):
     monkeypatch.setattr(linear, "available_memory", lambda: 1000)
-    found = ModalSolver(box.model, SolverOptions(modes=26, tolerance=1e-4), COMM).solve()
+    found = solids.analysed(box.model, modes=26, tolerance=1e-4)
     assert (found.evidence["method"], found.evidence["linear_solver"]) == ("lobpcg", "amg-cg")
     assert np.abs(found.values[RIGID_MODES:] / box.exact[:20] - 1.0).max() <= 1e-4
 
@@ -230,6 +228,5 @@ def test_any_number_of_ranks_finds_the_same(method, run_cli, mpiexec, tmp_path):
     spectra = []
     alone = run_cli("solver", *command, check=True)
     for done in (alone, *(mpiexec(ranks, "solver", *command, check=True) for ranks in (2, 3))):
-        summary = json.loads(done.stdout)
-        spectra.append(summary["frequencies_hz"][RIGID_MODES:])
+        spectra.append(json.loads(done.stdout)["frequencies_hz"][RIGID_MODES:])
     np.testing.assert_allclose(spectra[1:], [spectra[0]] * 2, rtol=1e-8)

@@ -1,7 +1,5 @@
 """Motion and sound of a struck solid: against time integration of K and M, and laws that hold."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -13,8 +11,6 @@ from carillon.errors import UserError
 from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel, fine_model
 from solver.__main__ import main
-from solver.analysis.modal_solver import modal_analysis
-from solver.analysis.options import SolverOptions
 from solver.assembly.sparse import assembled
 from solver.coarsening.model import coarse_model
 from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
@@ -36,7 +32,7 @@ from solver.response.response import (
 from solver.response.response_file import StrikeOptions, read_response, respond, write_response
 from solver.response.surface import surface_normals, surface_of
 from solver.verification.audit import audit
-from tests import cut_solids
+from tests import cut_solids, solids
 from tests.edited_files import edited
 from tests.solids import box_mesh, random_box
 
@@ -159,8 +155,7 @@ def test_interpolation_is_exact_for_trilinear_fields_and_agrees_with_the_prolong
         np.testing.assert_allclose(
             interpolation(model, points) @ field(model.mesh.nodes), field(points)
         )
-    at_nodes = interpolation(coarse, blocks.fine.nodes)
-    assert abs(at_nodes - prolongation(blocks)).max() < 1e-12
+    assert abs(interpolation(coarse, blocks.fine.nodes) - prolongation(blocks)).max() < 1e-12
 
 
 def test_points_near_parts_of_a_block_belong_to_the_part():
@@ -201,10 +196,9 @@ def tilted():
     """A box that stands askew in its lattice, and modes of its finite cells."""
     surface = cut_solids.turned(cut_solids.box(0.2, 0.12, 0.03))
     model = cut_solids.uniform(cut_solids.spaced(surface, 0.02))
-    found = modal_analysis(model, SolverOptions(modes=12, method="slepc"))
+    found = solids.analysed(model, modes=12, method="slepc")
     values, block = found.values, found.system.gather(found.vectors)
-    hertz = frequencies(values)
-    return surface, ModesFile(values, hertz, block, found.residuals, model, {}, {})
+    return surface, ModesFile(values, frequencies(values), block, found.residuals, model, {}, {})
 
 
 def test_finite_cells_are_struck_on_the_surface_itself(tilted):
@@ -225,8 +219,7 @@ def test_a_place_outside_finite_cells_is_taken_to_the_nearest_inside(tilted, cap
     assert largest.sum() == 4
     for middle, normal in zip(surface.triangles_center[largest], surface.face_normals[largest]):
         caplog.clear()
-        here = choose_contacts(file, strike=middle)[0]
-        np.testing.assert_array_equal(here.position, middle)
+        np.testing.assert_array_equal(choose_contacts(file, strike=middle)[0].position, middle)
         assert caplog.messages == []
         outside = choose_contacts(file, strike=middle + 0.02 * normal)[0]
         assert np.linalg.norm(outside.position - middle) < 0.2 * file.mesh.edge
@@ -281,8 +274,7 @@ def test_sounds_do_not_depend_on_the_signs_of_modes_nor_on_a_turn_in_a_cluster()
 
 
 def test_every_strike_is_played_as_loud_as_the_truths_and_silence_stays_silent():
-    sounds = np.array([[4.0, -8.0], [0.0, 0.0], [0.1, 0.2]])
-    played = in_turn(sounds, np.array([8.0, 0.0, 0.2]))
+    played = in_turn(np.array([[4.0, -8.0], [0.0, 0.0], [0.1, 0.2]]), np.array([8.0, 0.0, 0.2]))
     np.testing.assert_allclose(played, [0.5, -1.0, 0.0, 0.0, 0.5, 1.0])
 
 

@@ -1,7 +1,5 @@
 """Which ranks make which merge of the component mode synthesis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -25,13 +23,10 @@ def balanced_tree(levels: int) -> MergeTree:
     return MergeTree(parts, tuple(merges))
 
 
-def nodes_of(tree: MergeTree, nodes: list[float]) -> list[float]:
-    return [sum(nodes[start:stop]) for start, stop in tree.ranges()]
-
-
 def plan(levels: int, ranks: int, keep: int, nodes: list[float] | None = None) -> tuple:
     tree = balanced_tree(levels)
-    nodes = nodes_of(tree, nodes or [600.0] * tree.parts)
+    nodes = nodes or [600.0] * tree.parts
+    nodes = [sum(nodes[start:stop]) for start, stop in tree.ranges()]
     owner = assign_ranks(np.array(nodes[: tree.parts]) ** 1.5, ranks)
     return tree, owner, nodes, schedule(tree, owner, nodes, keep)
 
@@ -41,8 +36,7 @@ def busiest(tree: MergeTree, nodes: list[float], plan: Schedule, keep: int, rank
     modes = planned_modes(tree, nodes, keep)
     flops = np.zeros(ranks)
     for step, team in zip(tree.merges, plan.teams, strict=True):
-        size = modes[step.left] + modes[step.right]
-        flops[list(team)] += eigen_flops(size, True) / len(team)
+        flops[list(team)] += eigen_flops(modes[step.left] + modes[step.right], True) / len(team)
     return float(flops.max())
 
 
@@ -74,8 +68,7 @@ def test_merges_at_one_level_are_on_different_ranks():
 
 def test_an_idle_rank_takes_merges_of_a_busy_one():
     # Three quarters of the merges are on the first rank, which has as much of the subdomains.
-    uneven = [200.0] * 12 + [1600.0] * 4
-    tree, owner, nodes, found = plan(4, 2, 300, uneven)
+    tree, owner, nodes, found = plan(4, 2, 300, [200.0] * 12 + [1600.0] * 4)
     moved = [
         step
         for step in tree.merges

@@ -1,7 +1,5 @@
 """Six rigid motions are told from slow elastic ones, however slender the solid."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -12,8 +10,6 @@ from carillon.errors import ConvergenceError
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.model import RIGID_MODES, fine_model
 from solver.__main__ import main
-from solver.analysis.modal_solver import ModalSolver
-from solver.analysis.options import SolverOptions
 from solver.files.modes_file import write_modes
 from solver.verification.audit import audit_files
 from solver.verification.residuals import count_rigid
@@ -45,8 +41,7 @@ def slender_cells():
 
 def counted(model, method, modes):
     """Rigid modes of those found."""
-    options = SolverOptions(modes=modes, method=method)
-    return ModalSolver(model, options, COMM).solve().evidence["rigid_modes"]
+    return solids.analysed(model, modes=modes, method=method).evidence["rigid_modes"]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -95,8 +90,7 @@ def test_the_reference_of_the_wire_is_a_ritz_solution():
 def hinged():
     """Two blocks that share an edge alone."""
     block = solids.box_mesh(4, 4, 4).grid
-    grid = np.concatenate([block, block + [4, 4, 0]])
-    mesh = solids.hexmesh_from_grid(grid, np.zeros(3), 0.01)
+    mesh = solids.hexmesh_from_grid(np.concatenate([block, block + [4, 4, 0]]), np.zeros(3), 0.01)
     return fine_model(mesh, np.full(mesh.n_cells, 1e9))
 
 
@@ -110,15 +104,14 @@ def test_a_hinge_is_told_however_few_the_modes(method, modes):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_wire_with_a_hinge_amid_is_refused(method):
     half = solids.box_mesh(40, 2, 2).grid
-    grid = np.concatenate([half, half + [40, 2, 0]])
-    mesh = solids.hexmesh_from_grid(grid, np.zeros(3), 0.01)
+    mesh = solids.hexmesh_from_grid(np.concatenate([half, half + [40, 2, 0]]), np.zeros(3), 0.01)
     with pytest.raises(ConvergenceError, match="7 zero-frequency modes found"):
         counted(fine_model(mesh, np.full(mesh.n_cells, 1e9)), method, 10)
 
 
 def test_an_audit_counts_the_same(voxel_wires, tmp_path):
     model, path = voxel_wires[50], tmp_path / "wire.h5"
-    found = ModalSolver(model, SolverOptions(modes=8), COMM).solve()
+    found = solids.analysed(model, modes=8)
     write_modes(path, model, found.values, [found.vectors], found.residuals, {}, {})
     assert audit_files([path])["wire"].rigid_modes == RIGID_MODES
 

@@ -1,7 +1,5 @@
 """Solids of many symmetries have crowded spectra: every copy is found, by every method."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -13,8 +11,6 @@ from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.geometry import hexmesh_from_voxels, voxelize
 from carillon.fem.model import RIGID_MODES, fine_model
 from solver.__main__ import main
-from solver.analysis.modal_solver import ModalSolver
-from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.correction import random_start
 from solver.correction.enrichment import Ritz
@@ -83,8 +79,7 @@ def test_every_copy_is_found_however_many_modes_are_asked_for(body, discretisati
     exact = solids.dense_eigenvalues(model)
     for modes in (7, 12, 31, 32, 33, 60):
         for method in ("lanczos", "hcms"):
-            options = SolverOptions(modes=modes, method=method, tolerance=1e-8)
-            found = ModalSolver(model, options, COMM).solve().values
+            found = solids.analysed(model, modes=modes, method=method, tolerance=1e-8).values
             error = np.abs(found[RIGID_MODES:] / exact[RIGID_MODES:modes] - 1.0)
             assert error.max() <= 1e-8, (method, modes)
 
@@ -93,7 +88,7 @@ def test_every_copy_is_found_however_many_modes_are_asked_for(body, discretisati
 def test_one_of_five_modes_that_are_all_but_equal_is_found(seed):
     model = model_of("ball", 6, "finite-cell")
     exact = solids.dense_eigenvalues(model)
-    found = ModalSolver(model, SolverOptions(modes=7, method="hcms", seed=seed), COMM).solve()
+    found = solids.analysed(model, modes=7, method="hcms", seed=seed)
     assert abs(found.values[-1] / exact[RIGID_MODES] - 1.0) <= 1e-7 and len(found.values) == 7
 
 
@@ -107,8 +102,7 @@ def test_nearly_all_modes_of_a_small_model_can_be_asked_for(body, resolution):
     exact = solids.dense_eigenvalues(model)
     for modes in (60, 2 * model.n_dofs // 3, model.n_dofs - 1):
         for method in ("auto", "lanczos", "hcms"):
-            options = SolverOptions(modes=modes, method=method)
-            found = ModalSolver(model, options, COMM).solve().values
+            found = solids.analysed(model, modes=modes, method=method).values
             error = np.abs(found[RIGID_MODES:] / exact[RIGID_MODES:modes] - 1.0)
             assert error.max() <= 1e-7, (method, modes)
 
@@ -121,8 +115,7 @@ def test_a_ball_sounds_as_lamb_says(resolution, modes):
     model = cut_solids.uniform(finite_cells(surface, resolution))
     # As large as its faces make it.
     radius = (0.75 * surface.volume / np.pi) ** (1.0 / 3.0)
-    options = SolverOptions(modes=modes, tolerance=1e-6)
-    found = ModalSolver(model, options, COMM).solve()
+    found = solids.analysed(model, modes=modes, tolerance=1e-6)
     hertz = np.sqrt(found.values[RIGID_MODES:]) / (2.0 * np.pi)
     constants = cut_solids.YOUNG, cut_solids.POISSON, cut_solids.DENSITY
     exact = theories.sphere_frequencies(radius, *constants, 1.1 * hertz[-1])
@@ -169,7 +162,7 @@ def test_a_shift_beyond_most_wanted_eigenvalues_is_taken_back(monkeypatch):
         return linear.inverse(system, shifts[-1])
 
     monkeypatch.setattr(random_start, "inverse_amid", beyond)
-    found = ModalSolver(model, SolverOptions(modes=60, method="lanczos"), COMM).solve()
+    found = solids.analysed(model, modes=60, method="lanczos")
     assert np.abs(found.values[RIGID_MODES:] / exact[:54] - 1.0).max() <= 1e-7
     assert len(shifts) == 1
 
@@ -178,8 +171,7 @@ def test_an_invariant_space_goes_on_with_random_vectors():
     """A start of exact modes spans an invariant space at once."""
     model = solids.random_box(4, 3, 3)
     system, linear = system_of(model)
-    options = SolverOptions(modes=14, tolerance=1e-10)
-    modes = ModalSolver(model, options, COMM).solve().vectors[:, RIGID_MODES:]
+    modes = solids.analysed(model, modes=14, tolerance=1e-10).vectors[:, RIGID_MODES:]
     inverse = linear.inverse(system, 0.5 * solids.dense_eigenvalues(model)[30])
     basis = KrylovBasis(system, inverse, np.ascontiguousarray(modes), 60)
     basis.extend()
@@ -187,8 +179,7 @@ def test_an_invariant_space_goes_on_with_random_vectors():
     for _ in range(4):
         basis.extend()
     _, vectors = basis.ritz_pairs(30)
-    gram = system.inner(vectors, system.times_mass(vectors))
-    assert np.abs(gram - np.eye(30)).max() < 1e-8
+    assert np.abs(system.inner(vectors, system.times_mass(vectors)) - np.eye(30)).max() < 1e-8
 
 
 def test_a_basis_takes_more_narrow_blocks_than_wide_ones():

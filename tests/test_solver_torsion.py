@@ -1,23 +1,18 @@
 """The expected distance from a solid tells of the warping that few cells across do not have."""
 
-from __future__ import annotations
-
 import json
 from itertools import product
 
 import numpy as np
 import pytest
 import trimesh
-from mpi4py import MPI
 
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.model import RIGID_MODES
 from solver.__main__ import main
 from solver.accuracy.cubics import cubic_surplus
 from solver.accuracy.estimate import estimate_cell_errors
-from solver.analysis.modal_solver import ModalSolver
-from solver.analysis.options import SolverOptions
-from tests import cut_solids
+from tests import cut_solids, solids
 
 LENGTH, SIDE = 0.8, 0.1
 SHEAR = cut_solids.YOUNG / (2.0 * (1.0 + cut_solids.POISSON))
@@ -43,8 +38,7 @@ RODS = {
 def solved(surface, resolution, modes=16):
     """A model of finite cells and its modes."""
     model = cut_solids.uniform(finite_cells(surface, resolution))
-    options = SolverOptions(modes=modes, tolerance=1e-6)
-    found = ModalSolver(model, options, MPI.COMM_SELF).solve()
+    found = solids.analysed(model, modes=modes, tolerance=1e-6)
     return model, found.values, found.system.gather(found.vectors)
 
 
@@ -52,8 +46,7 @@ def torsion(surface, model, modes):
     """Number of the mode in which the ends of the rod turn most against each other."""
     axis = np.linalg.eigh(surface.moment_inertia)[1][:, 0]
     arms = model.mesh.nodes - surface.center_mass
-    along = arms @ axis
-    twist = np.cross(axis, arms) * np.sign(along)[:, None]
+    twist = np.cross(axis, arms) * np.sign(arms @ axis)[:, None]
     turned = twist.ravel() @ modes
     turned[:RIGID_MODES] = 0.0
     return int(np.abs(turned).argmax())
@@ -94,6 +87,10 @@ def test_bending_of_the_rod_is_told_as_before():
     assert np.delete(told.errors, 15 - RIGID_MODES - 1).max() < 0.01
 
 
+ROD_HERTZ = np.sqrt(1e9 / 2.5 / 1e3 * 0.1406 * 6.0) / (2.0 * 0.5)
+"""Torsion of the rod below."""
+
+
 @pytest.fixture(scope="module")
 def rod(tmp_path_factory):
     """A rod with one cell across at resolution 40."""
@@ -104,19 +101,13 @@ def rod(tmp_path_factory):
 
 def test_voxels_are_told_their_torsion(rod, tmp_path, capfd):
     out = tmp_path / "modes.h5"
-    assert (
-        main(
-            ["modes", str(rod), "--resolution", "40", "--modes", "14", "--json"]
-            + ["--out", str(out)]
-        )
-        == 0
-    )
+    command = ["modes", str(rod), "--resolution", "40", "--modes", "14", "--json"]
+    assert main([*command, "--out", str(out)]) == 0
     summary = json.loads(capfd.readouterr().out)
-    exact = np.sqrt(1e9 / 2.5 / 1e3 * 0.1406 * 6.0) / (2.0 * 0.5)
     hertz = np.array(summary["frequencies_hz"])
-    number = int(np.abs(hertz / (1.089 * exact) - 1.0).argmin())
+    number = int(np.abs(hertz / (1.089 * ROD_HERTZ) - 1.0).argmin())
     assert summary["solid_frequency_error_worst_mode"] == number + 1
-    error = hertz[number] / exact - 1.0
+    error = hertz[number] / ROD_HERTZ - 1.0
     assert summary["solid_frequency_error_worst"] == pytest.approx(error, rel=0.5)
 
 
@@ -127,5 +118,4 @@ def test_an_accuracy_that_is_asked_for_is_that_of_torsion_too(rod, tmp_path, cap
     assert main([*command, *words]) == 0
     summary = json.loads(capfd.readouterr().out)
     assert summary["resolution"] > 40
-    exact = np.sqrt(1e9 / 2.5 / 1e3 * 0.1406 * 6.0) / (2.0 * 0.5)
-    assert np.abs(np.array(summary["frequencies_hz"]) / exact - 1.0).min() < 0.03
+    assert np.abs(np.array(summary["frequencies_hz"]) / ROD_HERTZ - 1.0).min() < 0.03

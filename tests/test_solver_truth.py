@@ -1,7 +1,5 @@
 """Ground truth: nothing is missed, and what was missed at first is found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,7 +96,7 @@ def lose(monkeypatch):
 def test_ground_truth_equals_lapack_and_is_proven_complete(method):
     model = solids.random_box(8, 5, 4)
     exact = solids.dense_eigenvalues(model)[:50]
-    result = modal_analysis(model, SolverOptions(method=method, modes=50), COMM)
+    result = solids.analysed(model, method=method, modes=50)
     assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
     assert result.evidence["inertia_count"] == result.evidence["inertia_expected"] >= 50
     assert result.residuals.max() < 1e-8
@@ -131,11 +129,9 @@ def test_what_one_factorisation_refuses_the_next_does(monkeypatch):
 
 @pytest.mark.parametrize("method", ["slepc", "arpack"])
 def test_rigid_modes_are_the_rigid_motions(method):
-    model = solids.random_box(6, 4, 3)
-    result = modal_analysis(model, SolverOptions(method=method, modes=20), COMM)
+    result = solids.analysed(solids.random_box(6, 4, 3), method=method, modes=20)
     system = result.system
-    rigid = result.vectors[:, :RIGID_MODES]
-    share = system.inner(system.rigid, system.times_mass(rigid))
+    share = system.inner(system.rigid, system.times_mass(result.vectors[:, :RIGID_MODES]))
     assert np.abs(share.T @ share - np.eye(RIGID_MODES)).max() < 1e-12
     assert (result.values[:RIGID_MODES] >= 0.0).all()
     assert (np.diff(result.values) >= 0.0).all()
@@ -147,7 +143,7 @@ def test_missed_modes_are_found_and_told(method, lose):
     model = solids.random_box(6, 4, 3)
     exact = solids.dense_eigenvalues(model)[:40]
     lose(0, 1, 20, 33)
-    result = modal_analysis(model, SolverOptions(method=method, modes=40), COMM)
+    result = solids.analysed(model, method=method, modes=40)
     assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
     assert result.evidence["orthogonality"] < 1e-9
     assert result.evidence["modes_added"] == 4
@@ -156,20 +152,13 @@ def test_missed_modes_are_found_and_told(method, lose):
     assert result.residuals.max() < 1e-8
 
 
-def test_a_mode_missed_beyond_those_wanted_is_none_of_them(lose):
+@pytest.mark.parametrize("lost", [[40 - RIGID_MODES], range(0, 60, 3)], ids=["spare", "too many"])
+def test_modes_missed_at_first_are_none_of_those_found(lost, lose):
+    """Be it the first spare one alone, or so many that too few are left."""
     model = solids.random_box(6, 4, 3)
     exact = solids.dense_eigenvalues(model)[:40]
-    # The first spare mode.
-    lose(40 - RIGID_MODES)
-    values = modal_analysis(model, SolverOptions(method="slepc", modes=40), COMM).values
-    assert np.abs(values[6:] / exact[6:] - 1.0).max() < 1e-9
-
-
-def test_too_few_modes_at_first_are_no_end(lose):
-    model = solids.random_box(6, 4, 3)
-    exact = solids.dense_eigenvalues(model)[:40]
-    lose(*range(0, 60, 3))
-    values = modal_analysis(model, SolverOptions(method="slepc", modes=40), COMM).values
+    lose(*lost)
+    values = solids.analysed(model, method="slepc", modes=40).values
     assert np.abs(values[6:] / exact[6:] - 1.0).max() < 1e-9
 
 
@@ -184,9 +173,7 @@ def test_corrected_modes_that_lack_one_are_completed(monkeypatch):
         return replace(result, values=values, vectors=vectors)
 
     monkeypatch.setattr(corrected, "correct", losing)
-    result = modal_analysis(
-        model, SolverOptions(modes=40, check_inertia=True, tolerance=1e-10), COMM
-    )
+    result = solids.analysed(model, modes=40, check_inertia=True, tolerance=1e-10)
     assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
     assert result.evidence["modes_added"] == 1
 
@@ -204,7 +191,7 @@ def test_without_a_count_modes_are_searched_for_until_there_is_none(lose, monkey
     model = solids.random_box(6, 4, 3)
     exact = solids.dense_eigenvalues(model)[:40]
     lose(4, 20, 21)
-    result = modal_analysis(model, SolverOptions(method="slepc", modes=40), COMM)
+    result = solids.analysed(model, method="slepc", modes=40)
     # One mode is not missed: the one that the lost ones let in at the end.
     assert np.abs(result.values[6:] / exact[6:] - 1.0).max() < 1e-9
     assert result.evidence["modes_added"] >= 3
@@ -226,8 +213,7 @@ def test_inertia_counts_eigenvalues():
     exact = solids.dense_eigenvalues(model)
     system = system_of(model)
     for count in (6, 7, 30, 100):
-        between = 0.5 * (exact[count - 1] + exact[count])
-        assert count_below(system, between) == count
+        assert count_below(system, 0.5 * (exact[count - 1] + exact[count])) == count
 
 
 def test_start_depends_on_seed_and_search_but_not_on_the_partition():
@@ -242,8 +228,7 @@ def test_start_depends_on_seed_and_search_but_not_on_the_partition():
     assert np.abs(starts).max() <= 1.0
     # Means and correlations of that many independent numbers.
     assert np.abs(starts.mean(axis=0)).max() < 4.0 / np.sqrt(3.0 * len(starts))
-    correlation = np.corrcoef(starts.T) - np.eye(3)
-    assert np.abs(correlation).max() < 4.0 / np.sqrt(len(starts))
+    assert np.abs(np.corrcoef(starts.T) - np.eye(3)).max() < 4.0 / np.sqrt(len(starts))
 
 
 @pytest.mark.mpi

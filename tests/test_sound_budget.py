@@ -1,7 +1,5 @@
 """The budget of a search: as many modal analyses as were asked for, and never for the worse."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +17,7 @@ from sound.design.tasks import Task
 from studies.design.measure import _medians, compare_optimisers
 from tests import small_project
 from tests.counted_analyses import counted
+from tests.small_project import with_options
 
 METHODS = sorted(OPTIMISERS)
 TINY = [1, 2, 3, 8]
@@ -37,11 +36,6 @@ def of_other_targets(problem):
     """A design to go on from that sounds like something else."""
     targets = small_project.targets(replace(problem.project, coarsen="none"), seed=5)
     return optimise(with_options(prepare(problem.project, targets), evaluations=40))
-
-
-def with_options(problem, **changes):
-    optimiser = replace(problem.project.optimiser, **changes)
-    return replace(problem, project=replace(problem.project, optimiser=optimiser))
 
 
 @pytest.mark.parametrize("fine_check", [False, True])
@@ -96,8 +90,7 @@ def test_an_analysis_that_found_no_modes_counts(problem, monkeypatch, descends, 
     monkeypatch.setattr(pool._simulation.elements, "solve", fails_from_there)
     options = StepOptions(((True, True),), 1e-2, 0.5) if descends else None
     limits = DescentLimits(evaluations=most)
-    task = Task(np.zeros(10), start, options=options, steps=9, limits=limits)
-    (trial,) = processes.run([task])
+    (trial,) = processes.run([Task(np.zeros(10), start, options=options, steps=9, limits=limits)])
     processes.close()
     assert trial.evaluations == len(made) == (most if descends else min(most, 2))
     assert np.isfinite(trial.cost.total) == (most > 1)

@@ -1,7 +1,5 @@
 """Sound files are read and written as they should be; synthesised clips sound as they say."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -180,21 +178,18 @@ def test_what_is_no_file_is_not_waited_for(tmp_path):
             read_wav(tmp_path / name)
 
 
+CLIP = ("clip", "wood", "--out", "hit.wav")
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
         (["clip", "wood", "--out", "hit.mp3"], "hit.mp3: ends in .mp3, expected .* .wav"),
         (["clip", "wood", "--out", "hit"], "hit: ends in nothing, expected .* .wav"),
-        (["clip", "wood", "--note", "", "--out", "hit.wav"], "'' is not a note"),
-        (
-            ["clip", "wood", "--rate", "1e11", "--out", "hit.wav"],
-            "expected a whole number",
-        ),
-        (["clip", "wood", "--rate", "768001", "--out", "hit.wav"], "expected at most 768,000"),
-        (
-            ["clip", "wood", "--seed", str(2**64), "--out", "hit.wav"],
-            "expected at most 9,223",
-        ),
+        ([*CLIP, "--note", ""], "'' is not a note"),
+        ([*CLIP, "--rate", "1e11"], "expected a whole number"),
+        ([*CLIP, "--rate", "768001"], "expected at most 768,000"),
+        ([*CLIP, "--seed", str(2**64)], "expected at most 9,223"),
         (["extract", "end.wav", "--residual", "x.mp3"], "x.mp3: ends in .mp3"),
         (["extract", "end.wav", "--residual", "end.wav"], "is an input and would be replaced"),
         (["extract", "end.wav", "--residual", "./end.wav"], "is an input and would be replaced"),
@@ -253,8 +248,7 @@ def test_wood_dies_away_sooner_than_metal_and_strings_are_nearly_harmonic():
     sounds = {name: synthesised(name, 300.0, 0.2, 44_100, 0) for name in NAMES}
     assert sounds["wood"].dampings[0] > 3.0 * sounds["metal"].dampings[0]
     piano = sounds["piano"].frequencies
-    numbers = np.round(piano / piano[0])
-    sharpness = piano / (numbers * piano[0])
+    sharpness = piano / (np.round(piano / piano[0]) * piano[0])
     assert (np.diff(sharpness) > 0.0).all()
     assert sharpness[-1] < 1.1
     metal = sounds["metal"].frequencies / sounds["metal"].frequencies[0]

@@ -1,7 +1,5 @@
 """The search for a material: what it reaches, and what it does not depend on."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -37,6 +35,7 @@ from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from tests import small_project
 from tests.patience import HANG_SECONDS, words_of
+from tests.small_project import with_options
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +47,6 @@ def problem(tmp_path_factory):
 @pytest.fixture(scope="module")
 def designed(problem):
     return optimise(problem)
-
-
-def with_options(problem, **changes):
-    project = problem.project
-    return replace(
-        problem, project=replace(project, optimiser=replace(project.optimiser, **changes))
-    )
 
 
 def with_targets(problem, targets):
@@ -137,8 +129,7 @@ def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation):
 
 def test_bounds_narrower_than_the_moduli_have_their_middle():
     moduli = np.array([1e8, 1e9, 1e10])
-    factor = weight(moduli, 1000.0, (1e6, 1e6 + 1.0))
-    assert factor * 1e9 == pytest.approx(1e6)
+    assert weight(moduli, 1000.0, (1e6, 1e6 + 1.0)) * 1e9 == pytest.approx(1e6)
     assert weight(moduli, 1000.0, None) == 1.0
     assert weight(moduli, 1000.0, (1e15, 2e15)) == 1e3  # what a solid may weigh
 
@@ -273,8 +264,7 @@ def test_cost_vanishes_at_the_targets_and_knows_no_scale_nor_sign(problem):
 
 
 def test_the_amplitude_of_every_mode_counts(problem):
-    objective = problem.setting.objective
-    targets = objective.targets
+    targets = problem.setting.objective.targets
     values = targets.frequencies**2
     heard = Objective(targets, Weights(1.0, 10.0, 0.0))
     assert heard.cost(values, targets.amplitudes, 0.0).total < 1e-20
@@ -301,8 +291,7 @@ def test_a_worker_that_dies_is_told(problem):
     z = np.zeros(problem.setting.material.dimensions)
     try:
         processes.run([Task(z)] * 2)
-        process = next(iter(processes._pool._processes.values()))
-        threading.Timer(0.2, process.kill).start()
+        threading.Timer(0.2, next(iter(processes._pool._processes.values())).kill).start()
         with pytest.raises(UserError, match="died"):
             while True:
                 processes.run([Task(z)] * 4)
@@ -404,11 +393,10 @@ def workers_of(process):
     while len(workers) < 2:
         assert process.poll() is None, process.communicate()
         time.sleep(0.1)
-        children = psutil.Process(process.pid).children()
-        workers = [child for child in children if is_at_work(child)]
+        # One that has begun waits for its parent's death in a thread of its own.
+        workers = [
+            child
+            for child in psutil.Process(process.pid).children()
+            if "spawn_main" in " ".join(words_of(child)) and child.num_threads() > 1
+        ]
     return workers
-
-
-def is_at_work(process):
-    """Whether it is a worker that has begun, and so waits for its parent's death as well."""
-    return "spawn_main" in " ".join(words_of(process)) and process.num_threads() > 1

@@ -1,7 +1,5 @@
 """What a design file gives back, and what it refuses."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -12,38 +10,25 @@ import pytest
 from carillon.errors import UserError
 from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
-from tests.edited_files import edited
+from tests.edited_files import edited, put
 from tests.small_design import small_design
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path) -> Path:
     write_design(tmp_path / "design.h5", small_design())
     return tmp_path / "design.h5"
 
 
-def assert_same(actual: object, expected: object) -> None:
-    if isinstance(expected, dict):
-        assert actual.keys() == expected.keys()
-        for key in expected:
-            assert_same(actual[key], expected[key])
-    elif isinstance(expected, (list, tuple)):
-        assert len(actual) == len(expected)
-        for a, b in zip(actual, expected):
-            assert_same(a, b)
-    else:
-        np.testing.assert_array_equal(actual, expected)
-
-
-def test_a_design_comes_back(path: Path) -> None:
+def test_a_design_comes_back(path):
     read = asdict(read_design(path))
     assert read.pop("provenance")["commit"]
     expected = asdict(small_design())
     del expected["provenance"]
-    assert_same(read, expected)
+    np.testing.assert_equal(read, expected)
 
 
-def test_empty_residuals_and_history_come_back(tmp_path: Path) -> None:
+def test_empty_residuals_and_history_come_back(tmp_path):
     design = small_design()
     targets = replace(design.targets, residuals=(np.zeros(0), np.zeros(0)))
     empty = replace(design, targets=targets, history=design.history[:0])
@@ -53,7 +38,7 @@ def test_empty_residuals_and_history_come_back(tmp_path: Path) -> None:
     assert len(designed.history) == 0
 
 
-def test_every_dataset_says_its_unit_and_what_it_is(path: Path) -> None:
+def test_every_dataset_says_its_unit_and_what_it_is(path):
     unlabelled = []
 
     def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
@@ -65,13 +50,13 @@ def test_every_dataset_says_its_unit_and_what_it_is(path: Path) -> None:
     assert unlabelled == []
 
 
-def test_frequencies_are_those_of_the_elastic_modes(path: Path) -> None:
+def test_frequencies_are_those_of_the_elastic_modes(path):
     design = read_design(path)
     assert len(design.frequencies) == design.elastic_modes.shape[1] == 8
     np.testing.assert_allclose((2 * np.pi * design.frequencies) ** 2, design.eigenvalues[6:])
 
 
-def test_parts_that_do_not_fit_are_not_written(tmp_path: Path) -> None:
+def test_parts_that_do_not_fit_are_not_written(tmp_path):
     design = small_design()
     with pytest.raises(ValueError, match="modes of shape"):
         write_design(tmp_path / "design.h5", replace(design, modes=design.modes[:, 1:]))
@@ -79,39 +64,23 @@ def test_parts_that_do_not_fit_are_not_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "rows", "complaint"),
+    ("change", "complaint"),
     [
-        ("targets/dampings", 3, "holds dampings of shape"),
-        ("eigenvalues", 13, "holds eigenvalues of shape"),
-        ("surface/vertices", 5, "names the surface's vertex"),
+        (put("targets/dampings", lambda values: values[:3]), "holds dampings of shape"),
+        (put("eigenvalues", lambda values: values[:13]), "holds eigenvalues of shape"),
+        (put("surface/vertices", lambda values: values[:5]), "names the surface's vertex"),
+        (lambda file: file.pop("targets/rates"), "incomplete"),
+        (lambda file: file.attrs.modify("schema_version", 99), "schema 99"),
     ],
 )
-def test_a_file_whose_parts_do_not_fit_is_refused(
-    path: Path, name: str, rows: int, complaint: str
-) -> None:
+def test_a_file_whose_parts_do_not_fit_is_refused(path, change, complaint):
     with edited(path) as file:
-        data = file[name][:rows]
-        del file[name]
-        file[name] = data
+        change(file)
     with pytest.raises(UserError, match=complaint):
         read_design(path)
 
 
-def test_a_file_that_lacks_a_part_is_refused(path: Path) -> None:
-    with edited(path) as file:
-        del file["targets/rates"]
-    with pytest.raises(UserError, match="incomplete"):
-        read_design(path)
-
-
-def test_another_schema_is_refused(path: Path) -> None:
-    with edited(path) as file:
-        file.attrs["schema_version"] = 99
-    with pytest.raises(UserError, match="schema 99"):
-        read_design(path)
-
-
-def test_a_damaged_file_is_refused(path: Path) -> None:
+def test_a_damaged_file_is_refused(path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
@@ -119,7 +88,7 @@ def test_a_damaged_file_is_refused(path: Path) -> None:
         read_design(path)
 
 
-def test_a_design_is_replaced_whole(path: Path) -> None:
+def test_a_design_is_replaced_whole(path):
     other: Design = replace(small_design(), evidence={"stopped": "later"})
     write_design(path, other)
     assert read_design(path).evidence == {"stopped": "later"}
@@ -143,7 +112,7 @@ EVIDENCE = {"[]": "evidence", '{"cost": "low"}': "cost", '{"cost_start": []}': "
 
 
 @pytest.mark.parametrize("name", ["settings", "evidence"])
-def test_settings_and_evidence_of_another_kind_are_told(path: Path, name: str) -> None:
+def test_settings_and_evidence_of_another_kind_are_told(path, name):
     given = SETTINGS if name == "settings" else EVIDENCE
     for text, key in given.items():
         with edited(path) as file:

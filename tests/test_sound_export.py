@@ -1,14 +1,7 @@
 """What other tools read from an exported design."""
 
-from __future__ import annotations
-
-import base64
-import json
 import shutil
-import struct
-import subprocess
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -25,11 +18,13 @@ from solver.response.points import interpolation
 from solver.verification.audit import audit
 from solver.verification.comparison import compare_files
 from sound.__main__ import main
-from sound.export.gltf import EXTENSION, UNSIGNED_INT
+from sound.export.gltf import EXTENSION
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.bank import Bank, ring
+from tests.gltf_files import accessor, read_gltf
+from tests.programs import run
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.solids import box_mesh
 
@@ -74,7 +69,7 @@ int main(int, char** words) {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """The design and all its exports."""
     path = tmp_path_factory.mktemp("export")
     write_design(path / "design.h5", small_design())
@@ -94,7 +89,7 @@ def target_amplitudes() -> np.ndarray:
     return listening.gains[:, None] * solid.amplitudes(listening.positions, inward)
 
 
-def test_the_solver_reads_and_audits_the_embedded_mesh(folder: Path) -> None:
+def test_the_solver_reads_and_audits_the_embedded_mesh(folder):
     file = read_modes(folder / "pan.h5")
     np.testing.assert_array_equal(file.modes, small_design().modes)
     row = audit(file)
@@ -104,7 +99,7 @@ def test_the_solver_reads_and_audits_the_embedded_mesh(folder: Path) -> None:
     assert compared.modes_compared == N_MODES and compared.subspace_angle_max < 1e-7
 
 
-def test_the_embedding_carries_modes_to_the_surface(folder: Path) -> None:
+def test_the_embedding_carries_modes_to_the_surface(folder):
     design = small_design()
     modes = design.modes.reshape(design.model.mesh.n_nodes, 3, -1)
     with h5py.File(folder / "pan.h5") as file:
@@ -118,31 +113,8 @@ def test_the_embedding_carries_modes_to_the_surface(folder: Path) -> None:
     np.testing.assert_allclose(motion, expected, atol=1e-12)
 
 
-def read_gltf(path: Path) -> tuple[dict[str, Any], bytes]:
-    """JSON and buffer of either kind of file, by the specification."""
-    raw = path.read_bytes()
-    if path.suffix == ".gltf":
-        document = json.loads(raw)
-        return document, base64.b64decode(document["buffers"][0]["uri"].split(",", 1)[1])
-    magic, version, total, length, kind = struct.unpack("<4sIII4s", raw[:20])
-    assert (magic, version, total, kind) == (b"glTF", 2, len(raw), b"JSON")
-    data_length, kind = struct.unpack("<I4s", raw[20 + length : 28 + length])
-    assert kind == b"BIN\0" and 28 + length + data_length == total
-    return json.loads(raw[20 : 20 + length]), raw[28 + length :]
-
-
-def accessor(document: dict[str, Any], data: bytes, number: int) -> np.ndarray:
-    entry = document["accessors"][number]
-    view = document["bufferViews"][entry["bufferView"]]
-    kind = "<u4" if entry["componentType"] == UNSIGNED_INT else "<f4"
-    width = {"SCALAR": 1, "VEC3": 3}[entry["type"]]
-    count = entry["count"] * width
-    assert view["byteOffset"] % 4 == 0 and view["byteLength"] == 4 * count
-    return np.frombuffer(data, kind, count, view["byteOffset"]).reshape(-1, width)
-
-
 @pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
-def test_gltf_is_the_surface(folder: Path, name: str) -> None:
+def test_gltf_is_the_surface(folder, name):
     loaded = trimesh.load(folder / name).to_geometry()
     assert loaded.is_watertight
     assert loaded.volume == pytest.approx(np.prod(SIDES), rel=1e-6)
@@ -150,7 +122,7 @@ def test_gltf_is_the_surface(folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
-def test_a_player_of_the_draft_makes_the_designed_sound(folder: Path, name: str) -> None:
+def test_a_player_of_the_draft_makes_the_designed_sound(folder, name):
     document, data = read_gltf(folder / name)
     assert document["extensionsUsed"] == [EXTENSION]
     model = document["extensions"][EXTENSION]["modalModels"][0]
@@ -170,14 +142,14 @@ def test_a_player_of_the_draft_makes_the_designed_sound(folder: Path, name: str)
         np.testing.assert_allclose(own, target_amplitudes()[row, order], rtol=1e-4)
 
 
-def test_the_loudest_modes_come_first(folder: Path) -> None:
+def test_the_loudest_modes_come_first(folder):
     document, _ = read_gltf(folder / "pan.glb")
     order = np.array(document["extensions"][EXTENSION]["modalModels"][0]["extras"]["modeNumbers"])
     energy = (target_amplitudes() ** 2).sum(axis=0) / small_design().targets.dampings
     assert (np.diff(energy[order - 1]) <= 0.0).all()
 
 
-def test_mass_properties_of_a_box() -> None:
+def test_mass_properties_of_a_box():
     a, b, c = SIDES
     properties = mass_properties(
         fine_model(box_mesh(6, 4, 2, 0.04), np.full(48, 1e9), density=500.0)
@@ -190,7 +162,7 @@ def test_mass_properties_of_a_box() -> None:
     assert np.linalg.det(properties.axes) == pytest.approx(1.0)
 
 
-def test_partly_filled_coarse_cells_weigh_what_their_fine_ones_do() -> None:
+def test_partly_filled_coarse_cells_weigh_what_their_fine_ones_do():
     mesh = box_mesh(5, 3, 3, 0.02)
     young = np.full(mesh.n_cells, 1e9)
     coarse, fine = (
@@ -203,7 +175,7 @@ def test_partly_filled_coarse_cells_weigh_what_their_fine_ones_do() -> None:
 
 
 @pytest.fixture(scope="module")
-def player(folder: Path) -> Path:
+def player(folder) -> Path:
     """The Faust model as a program that writes the sound of a strike."""
     for tool in ("faust", "g++"):
         if shutil.which(tool) is None:
@@ -211,17 +183,17 @@ def player(folder: Path) -> Path:
     (folder / "player.cpp").write_text(PLAYER)
     faust = ["faust", "-double", "-a", "player.cpp", "pan.dsp", "-o", "pan.cpp"]
     for words in (faust, ["g++", "-O1", "pan.cpp", "-o", "pan"]):
-        subprocess.run(words, cwd=folder, check=True, capture_output=True)
+        run(*words, cwd=folder, check=True)
     return folder / "pan"
 
 
 def played(player: Path, *words: float) -> np.ndarray:
-    done = subprocess.run([player, *map(str, words)], check=True, capture_output=True)
+    done = run(player, *words, check=True)
     return np.frombuffer(done.stdout)
 
 
 @pytest.mark.parametrize("position", [0, 1])
-def test_faust_plays_what_we_render(player: Path, position: int) -> None:
+def test_faust_plays_what_we_render(player, position):
     design = small_design()
     bank = Bank(design.frequencies, design.targets.dampings, RATE)
     expected = ring(bank, [(0.0, 2.0 * target_amplitudes()[position])], 22_050)
@@ -229,7 +201,7 @@ def test_faust_plays_what_we_render(player: Path, position: int) -> None:
     np.testing.assert_allclose(samples, expected, atol=1e-6 * np.abs(expected).max())
 
 
-def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> None:
+def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player):
     from solver.response.response import half_sine
 
     impulse, push = (played(player, 4, 1.0, contact) for contact in (0.0, 2.0))
@@ -237,16 +209,14 @@ def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player: Path) -> 
     np.testing.assert_allclose(push, expected, atol=1e-6 * np.abs(impulse).max())
 
 
-def test_faust_s_program_names_points_and_units(folder: Path) -> None:
+def test_faust_s_program_names_points_and_units(folder):
     text = (folder / "pan.dsp").read_text()
     assert "nPositions = 5;" in text and f"nModes = {N_MODES};" in text
     assert "'corner':0;'side':1;'vertex " in text
     assert "N s" in text and "kg^-1/2" in text
 
 
-def test_moduli_are_those_of_the_solver_s_cells_in_their_order(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_moduli_are_those_of_the_solver_s_cells_in_their_order(folder, tmp_path):
     out = tmp_path / "young.npy"
     assert main(["export", str(folder / "design.h5"), "--out", str(out)]) == 0
     design, cells = small_design(), box_mesh(6, 4, 2, 0.04)
@@ -254,14 +224,14 @@ def test_moduli_are_those_of_the_solver_s_cells_in_their_order(
     np.testing.assert_array_equal(young_modulus(str(out), cells), design.young)
 
 
-def test_no_more_points_are_struck_than_there_are(folder: Path) -> None:
+def test_no_more_points_are_struck_than_there_are(folder):
     points = ["--points", "10000", "--out", str(folder / "all.dsp")]
     assert main(["export", str(folder / "design.h5"), *points]) == 0
     count = len(np.unique(np.round(small_design().surface_vertices, 9), axis=0))
     assert f"nPositions = {count};" in (folder / "all.dsp").read_text()
 
 
-def test_an_ending_that_tells_no_format_is_refused(folder: Path, refuses) -> None:
+def test_an_ending_that_tells_no_format_is_refused(folder, refuses):
     design = folder / "design.h5"
     said = refuses(main, "export", design, "--out", folder / "pan.obj")
     assert "tells no format" in said
@@ -271,11 +241,11 @@ def test_an_ending_that_tells_no_format_is_refused(folder: Path, refuses) -> Non
     assert main(["export", str(folder / "design.h5"), *words]) == 0
 
 
-def test_a_design_is_not_overwritten(folder: Path, refuses) -> None:
+def test_a_design_is_not_overwritten(folder, refuses):
     said = refuses(main, "export", folder / "design.h5", "--out", folder / "design.h5")
     assert "is an input and would be replaced" in said
 
 
-def test_only_designs_are_exported(folder: Path, refuses) -> None:
+def test_only_designs_are_exported(folder, refuses):
     said = refuses(main, "export", folder / "pan.h5", "--out", folder / "other.glb")
     assert "expected a Carillon design file" in said

@@ -1,7 +1,5 @@
 """Modes of clips: what a synthesised clip was made of comes back, and bad clips are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import soundfile
@@ -84,8 +82,7 @@ def test_parameters_come_back_from_a_stereo_file_with_silence_before_the_strike(
     true = modes(6, 3000.0, seed=1)
     strike = 1234
     clip = np.concatenate([np.zeros(strike), 0.1 * sampled(true, RATE, 1.0, 40.0)])
-    random = np.random.default_rng(2)
-    clip += 1e-4 * random.standard_normal(len(clip))
+    clip += 1e-4 * np.random.default_rng(2).standard_normal(len(clip))
     path = tmp_path / "clip.wav"
     soundfile.write(path, np.stack([0.8 * clip, clip], axis=1), RATE, subtype="PCM_24")
     sound = extract(*read_wav(path))
@@ -110,15 +107,8 @@ def test_errors_are_those_that_the_noise_allows():
 @pytest.mark.parametrize("damping", [2.0, 30.0])
 def test_two_modes_a_bandwidth_apart_are_told_apart(damping):
     frequencies = np.array([1000.0, 1000.0 + damping / np.pi])
-    true = ModalSound(
-        frequencies,
-        np.array([damping, 1.2 * damping]),
-        np.array([1.0, 0.7]),
-        np.array([0.3, 2.0]),
-        np.zeros(0),
-        0,
-        {},
-    )
+    values = (frequencies, [damping, 1.2 * damping], [1.0, 0.7], [0.3, 2.0], np.zeros(0))
+    true = ModalSound(*map(np.array, values), rate=0, evidence={})
     sound = extract(sampled(true, RATE, 1.5), RATE)
     assert len(sound.frequencies) == 2
     np.testing.assert_allclose(sound.frequencies, true.frequencies, rtol=FREQUENCY_TOLERANCE)
@@ -170,8 +160,7 @@ def test_the_noise_of_a_blow_is_no_mode():
     sound = extract(true.modal_part() + knock, 16_000)
     apart = np.abs(sound.frequencies[:, None] / true.frequencies - 1.0).min(axis=1)
     assert (apart < FREQUENCY_TOLERANCE).all()
-    left = np.sum((sound.residual - knock[-len(sound.residual) :]) ** 2)
-    assert left < 0.2 * np.sum(knock**2)
+    assert np.sum((sound.residual - knock[-len(sound.residual) :]) ** 2) < 0.2 * np.sum(knock**2)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -182,8 +171,7 @@ def test_noise_of_any_seed_holds_no_mode(seed):
 
 def test_what_stands_out_of_the_rest_is_found():
     true = modes(5, 3000.0, seed=11, lowest=200.0)
-    found = further(sampled(true, RATE, 1.0), RATE)
-    hertz = found.imag * RATE / (2.0 * np.pi)
+    hertz = further(sampled(true, RATE, 1.0), RATE).imag * RATE / (2.0 * np.pi)
     assert (np.abs(hertz[:, None] / true.frequencies - 1.0).min(axis=0) < 0.02).all()
     assert not len(further(noise(RATE), RATE))
 
@@ -328,8 +316,7 @@ def test_of_two_strikes_the_first_is_taken_and_the_second_told(gain):
 
 
 def test_modes_that_beat_are_no_second_strike():
-    beats = single(400.0, 3.0, 1.0) + 0.95 * single(404.0, 3.0, 1.0)
-    assert second_strike(beats, RATE) is None
+    assert second_strike(single(400.0, 3.0, 1.0) + 0.95 * single(404.0, 3.0, 1.0), RATE) is None
 
 
 @pytest.mark.parametrize("cents", [-150.0, 100.0, 400.0])

@@ -1,7 +1,5 @@
 """Designs that are right on the fine solid, though the search works with a coarse one."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -29,6 +27,7 @@ from studies.sounds.pictures import fine_mesh
 from tests import small_project
 from tests.edited_files import edited
 from tests.small_design import small_design
+from tests.small_project import with_options
 from tests.solids import box_mesh
 
 EVALUATIONS = 200
@@ -40,12 +39,6 @@ def problem(tmp_path_factory):
     made = small_project.project(tmp_path_factory.mktemp("project"), evaluations=EVALUATIONS)
     targets = small_project.targets(made)
     return prepare(replace(made, coarsen="average"), targets)
-
-
-def with_options(problem, **changes):
-    project = problem.project
-    optimiser = replace(project.optimiser, **changes)
-    return replace(problem, project=replace(project, optimiser=optimiser))
 
 
 @pytest.fixture(scope="module")
@@ -92,11 +85,9 @@ def test_result_does_not_depend_on_the_number_of_workers(problem, checked):
 
 
 def test_descents_by_a_reduced_model_lower_the_cost(problem):
-    simulation = problem.setting.fine().simulation()
-    descent = Descent(simulation, problem.setting.objective)
+    descent = Descent(problem.setting.fine().simulation(), problem.setting.objective)
     z = np.zeros(problem.setting.material.dimensions)
-    record = descend_by_model(descent, z, None, 6, 0.3)
-    costs = [point.cost.total for point in record.costs]
+    costs = [point.cost.total for point in descend_by_model(descent, z, None, 6, 0.3).costs]
     assert costs == sorted(costs, reverse=True)
     assert costs[-1] < 0.05 * costs[0]
 
@@ -196,8 +187,7 @@ def test_the_command_says_what_the_file_says(checked, tmp_path, capsys):
     best = min(checked.evidence["checks"], key=lambda check: check["cost"])
     assert found["fine_rms_cents"] == pytest.approx(best["fine_rms_cents"], abs=0.05)
     assert main(["check", str(tmp_path / "design.h5")]) == 0
-    out = capsys.readouterr().out
-    assert f"{found['fine_rms_cents']:.1f} on the fine one" in out
+    assert f"{found['fine_rms_cents']:.1f} on the fine one" in capsys.readouterr().out
 
 
 @pytest.mark.nightly

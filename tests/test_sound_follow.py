@@ -1,7 +1,5 @@
 """What a search tells while it goes on, and what is left of a round that is broken off."""
 
-from __future__ import annotations
-
 import os
 import signal
 import struct
@@ -19,6 +17,7 @@ from sound.design.preparation import prepare
 from sound.design.tasks import Task
 from tests import small_project
 from tests.patience import HANG_SECONDS, wait_for
+from tests.small_project import with_options
 
 
 def write_half_a_result(path):
@@ -37,11 +36,6 @@ def problem(tmp_path_factory):
     made = small_project.project(tmp_path_factory.mktemp("project"), evaluations=60)
     targets = small_project.targets(made)
     return prepare(replace(made, coarsen="average"), targets)
-
-
-def with_options(problem, **changes):
-    optimiser = replace(problem.project.optimiser, **changes)
-    return replace(problem, project=replace(problem.project, optimiser=optimiser))
 
 
 @pytest.mark.parametrize("workers", [1, 2])

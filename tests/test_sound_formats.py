@@ -1,7 +1,5 @@
 """The modes of a clip do not depend on the format that it is written in."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Where no room is left, commands say so in one sentence and leave nothing behind."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from functools import partial
@@ -20,7 +18,7 @@ NO_ROOM = r"could not be written \(No space left on device; make room and run th
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("inputs")
     write_design(path / "design.h5", small_design())
     assert main(["clip", "wood", "--seconds", "0.5", "--out", str(path / "wood.wav")]) == 0
@@ -28,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def small_disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def small_disk(tmp_path_factory) -> Iterator[Path]:
     """A file system of 8 KiB."""
     path = tmp_path_factory.mktemp("disk")
     with disk_on(path, 8 * KIB):

@@ -1,7 +1,5 @@
 """`sound init`: a project with all keys in it, which is a project as it is."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -23,7 +21,7 @@ _KEY_BEHIND_A_MARK = re.compile(r"^( *)#( *[a-z_]+:)", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
-def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def clips(tmp_path_factory) -> Path:
     """Folder with a clip of many modes and one of few."""
     folder = tmp_path_factory.mktemp("clips")
     for name in ("metal", "wood"):
@@ -33,7 +31,7 @@ def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def here(clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(clips, tmp_path, monkeypatch) -> Path:
     """A folder with the clips in it, where commands are typed."""
     for clip in clips.iterdir():
         shutil.copy(clip, tmp_path)

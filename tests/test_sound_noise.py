@@ -1,7 +1,5 @@
 """What of a clip's rest is noise, and what are tones that no mode has."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -41,9 +39,15 @@ def decibels(ratio: float) -> float:
     return float(10.0 * np.log10(ratio))
 
 
+def assert_alike(noise: np.ndarray, expected: np.ndarray, octaves: np.ndarray = OCTAVES) -> None:
+    """To a decibel in every octave."""
+    for low in octaves:
+        assert abs(decibels(power(noise, low, 2 * low) / power(expected, low, 2 * low))) < 1.0
+
+
 @pytest.mark.parametrize("left_out", range(3))
 @pytest.mark.parametrize("level", [0.0, 1e-3, 1e-2])
-def test_a_partial_that_was_left_out_is_no_noise(left_out: int, level: float) -> None:
+def test_a_partial_that_was_left_out_is_no_noise(left_out, level):
     rest = partials(left_out) + decaying(level * hiss(), 5.0)
     noise, share = noise_part(rest, RATE)
     near = FREQUENCIES[left_out] + np.array([-1.0, 1.0]) * DAMPINGS[left_out]
@@ -53,37 +57,32 @@ def test_a_partial_that_was_left_out_is_no_noise(left_out: int, level: float) ->
 
 
 @pytest.mark.parametrize("samples", [hiss(), decaying(hiss(), 8.0)], ids=["steady", "decaying"])
-def test_white_noise_stays_as_it_is(samples: np.ndarray) -> None:
+def test_white_noise_stays_as_it_is(samples):
     noise, share = noise_part(samples, RATE)
-    for low in OCTAVES:
-        assert abs(decibels(power(noise, low, 2 * low) / power(samples, low, 2 * low))) < 1.0
+    assert_alike(noise, samples)
     assert share < 0.1
 
 
-def test_coloured_noise_stays_as_it_is() -> None:
+def test_coloured_noise_stays_as_it_is():
     samples = lfilter([1.0], [1.0, -0.95], hiss())
     noise, _ = noise_part(samples, RATE)
-    for low in OCTAVES:
-        assert abs(decibels(power(noise, low, 2 * low) / power(samples, low, 2 * low))) < 1.0
+    assert_alike(noise, samples)
 
 
-def test_a_clip_of_modes_and_noise_keeps_its_noise() -> None:
+def test_a_clip_of_modes_and_noise_keeps_its_noise():
     own = decaying(0.02 * hiss(), 3.0)
-    sound = extract(partials(0, 1, 2) + own, RATE)
-    noise, share = noise_part(sound.residual, RATE)
-    for low in OCTAVES:
-        assert abs(decibels(power(noise, low, 2 * low) / power(own, low, 2 * low))) < 1.0
+    noise, share = noise_part(extract(partials(0, 1, 2) + own, RATE).residual, RATE)
+    assert_alike(noise, own)
     assert share < 0.1
 
 
-def test_noise_beside_a_partial_stays() -> None:
+def test_noise_beside_a_partial_stays():
     own = decaying(0.02 * hiss(), 3.0)
     noise, _ = noise_part(own + partials(0), RATE)
-    for low in OCTAVES[OCTAVES >= 1000.0]:
-        assert abs(decibels(power(noise, low, 2 * low) / power(own, low, 2 * low))) < 1.0
+    assert_alike(noise, own, OCTAVES[OCTAVES >= 1000.0])
 
 
-def test_a_click_stays_and_nothing_sounds_before_it() -> None:
+def test_a_click_stays_and_nothing_sounds_before_it():
     begin, length = 2000, 200
     rest = np.zeros(COUNT)
     rest[begin : begin + length] = hiss()[:length]
@@ -99,7 +98,7 @@ def test_a_click_stays_and_nothing_sounds_before_it() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 300])
-def test_short_rests_and_silence_come_back(count: int) -> None:
+def test_short_rests_and_silence_come_back(count):
     noise, share = noise_part(hiss()[:count], RATE)
     assert len(noise) == count and 0.0 <= share < 0.2
     assert noise_part(np.zeros(count), RATE)[1] == 0.0

@@ -1,7 +1,5 @@
 """Project files: defaults, paths, and one sentence about each mistake."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +25,7 @@ SCHEMA = schema_of(Project)
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path) -> Path:
     for name in ("rim.wav", "top.wav"):
         (tmp_path / name).touch()
     return tmp_path
@@ -59,8 +57,7 @@ def test_what_a_project_leaves_out_takes_the_defaults_of_the_schema(folder):
         if "default" in part and "properties" not in part and key != "coarsen":
             assert described[key] == part["default"]
     assert described["coarsen"] == "ddfem"
-    cells = load(folder, discretisation="finite-cell")
-    assert cells.solid.coarsen == "none"
+    assert load(folder, discretisation="finite-cell").solid.coarsen == "none"
 
 
 def test_defaults_of_the_solid_are_those_of_the_solver():
@@ -74,8 +71,7 @@ def test_defaults_of_the_solid_are_those_of_the_solver():
 def test_choices_of_the_schema_are_those_of_the_code():
     material, optimiser = (SCHEMA["properties"][key] for key in ("material", "optimiser"))
     assert material["properties"]["law"]["enum"] == list(LAWS)
-    methods = optimiser["properties"]["method"]["enum"]
-    assert methods == list(OPTIMISERS)
+    assert optimiser["properties"]["method"]["enum"] == list(OPTIMISERS)
     assert set(SCHEMA["properties"]["coarsen"]["enum"]) - {"auto"} < set(COARSENINGS)
     assert SCHEMA["properties"]["discretisation"]["enum"] == list(DISCRETISATIONS)
 

@@ -1,7 +1,5 @@
 """Which modes a solid can have: what is had, what is not, and why."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,12 +1,9 @@
 """What the sound of a strike is made of."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -62,7 +59,7 @@ def design_solid() -> tuple[SoundingSolid, Listening]:
     return solid, Listening.of_design(design, solid)
 
 
-def test_bank_is_the_sum_of_damped_sinusoids_at_any_time() -> None:
+def test_bank_is_the_sum_of_damped_sinusoids_at_any_time():
     random = np.random.default_rng(1)
     f, d = random.uniform(50.0, 15_000.0, 20), random.uniform(1.0, 900.0, 20)
     strikes = [(seconds, random.uniform(0.0, 1.0, 20)) for seconds in (0.31, 0.0, 0.1234567, 0.5)]
@@ -74,7 +71,7 @@ def test_bank_is_the_sum_of_damped_sinusoids_at_any_time() -> None:
     np.testing.assert_allclose(sound, expected, atol=1e-9)
 
 
-def test_bank_goes_on_where_it_stopped() -> None:
+def test_bank_goes_on_where_it_stopped():
     f, d = np.array([440.0, 1000.0]), np.array([3.0, 50.0])
     whole, parts = (Bank(f, d, RATE) for _ in range(2))
     for bank in (whole, parts):
@@ -83,13 +80,13 @@ def test_bank_goes_on_where_it_stopped() -> None:
     np.testing.assert_allclose(pieces, whole.advance(4212), atol=1e-12)
 
 
-def test_modes_beyond_half_the_rate_are_silent_and_low_ones_stay() -> None:
+def test_modes_beyond_half_the_rate_are_silent_and_low_ones_stay():
     f, d = np.array([100.0, 4000.0, 4001.0]), np.full(3, 5.0)
     one, two = (ring(Bank(f, d, 8000), [(0.0, np.array(a))], 800) for a in ([1, 1, 1], [1, 0, 0]))
     np.testing.assert_array_equal(one, two)
 
 
-def test_amplitude_is_the_push_on_each_mode() -> None:
+def test_amplitude_is_the_push_on_each_mode():
     design = small_design()
     solid, _ = design_solid()
     strike = design.strikes[1]
@@ -101,7 +98,7 @@ def test_amplitude_is_the_push_on_each_mode() -> None:
     np.testing.assert_allclose(amplitudes, np.abs(pushed), rtol=1e-12)
 
 
-def test_signs_of_modes_do_not_matter() -> None:
+def test_signs_of_modes_do_not_matter():
     solid, listening = design_solid()
     signs = np.where(np.arange(N_MODES) % 2, -1.0, 1.0)
     hits = [Hit(0.0, small_design().strikes[0].position, np.array([0.3, -1.0, 0.2]))]
@@ -110,7 +107,7 @@ def test_signs_of_modes_do_not_matter() -> None:
     np.testing.assert_allclose(one, two, atol=1e-12)
 
 
-def test_mixing_a_cluster_does_not_matter() -> None:
+def test_mixing_a_cluster_does_not_matter():
     solid, _ = design_solid()
     f, d = solid.frequencies.copy(), solid.dampings.copy()
     f[3], d[3] = f[2], d[2]
@@ -123,7 +120,7 @@ def test_mixing_a_cluster_does_not_matter() -> None:
     np.testing.assert_allclose(one, two, atol=1e-12 * np.abs(one).max())
 
 
-def test_target_points_sound_as_loud_as_their_clips() -> None:
+def test_target_points_sound_as_loud_as_their_clips():
     design = small_design()
     solid, listening = design_solid()
     for strike, target in zip(design.strikes, design.targets.amplitudes):
@@ -131,7 +128,7 @@ def test_target_points_sound_as_loud_as_their_clips() -> None:
         assert listening.gain(strike.position) * amplitudes.max() == pytest.approx(target.max())
 
 
-def test_weights_are_one_at_a_struck_point_and_blend_between() -> None:
+def test_weights_are_one_at_a_struck_point_and_blend_between():
     _, listening = design_solid()
     first, second = listening.positions
     assert listening.weights(first).tolist() == [1.0, 0.0]
@@ -140,7 +137,7 @@ def test_weights_are_one_at_a_struck_point_and_blend_between() -> None:
     assert near.sum() == pytest.approx(1.0) and near[0] > 0.999
 
 
-def test_noise_follows_the_impulse_and_the_rate() -> None:
+def test_noise_follows_the_impulse_and_the_rate():
     design = small_design()
     solid, listening = design_solid()
     strike = design.strikes[1]
@@ -155,11 +152,10 @@ def test_noise_follows_the_impulse_and_the_rate() -> None:
     assert not added[:2205].any()
 
 
-def test_a_partial_that_was_missed_is_heard_nowhere() -> None:
+def test_a_partial_that_was_missed_is_heard_nowhere():
     """Neither at the point of its clip nor between, and the share of the clip is told."""
     design = small_design()
-    t = np.arange(RATE) / RATE
-    missed = 0.2 * partial(3210.0, 12.0, t)
+    missed = 0.2 * partial(3210.0, 12.0, np.arange(RATE) / RATE)
     residuals = (design.targets.residuals[0], np.zeros(0))
     louder = (np.pad(residuals[0], (0, RATE - len(residuals[0]))) + missed, residuals[1])
     solid = SoundingSolid.of_design(design)
@@ -179,16 +175,15 @@ def test_a_partial_that_was_missed_is_heard_nowhere() -> None:
     assert listening.missed[1] == 0.0
 
 
-def test_share_of_the_noise_is_that_of_its_energy() -> None:
+def test_share_of_the_noise_is_that_of_its_energy():
     modes = np.sin(np.arange(1000.0))
     assert residual_share(modes, 0.5 * modes) == pytest.approx(0.2)
     assert residual_share(modes, 0.0 * modes) == residual_share(0.0 * modes, 0.0 * modes) == 0.0
 
 
-def test_resampling_keeps_a_tone() -> None:
+def test_resampling_keeps_a_tone():
     t = np.arange(4000) / 8000
-    tone = np.sin(2 * np.pi * 440.0 * t)
-    resampled_tone = resampled(tone, 8000, 44_100)
+    resampled_tone = resampled(np.sin(2 * np.pi * 440.0 * t), 8000, 44_100)
     u = np.arange(len(resampled_tone)) / 44_100
     middle = (u > 0.05) & (u < 0.45)
     np.testing.assert_allclose(
@@ -196,7 +191,7 @@ def test_resampling_keeps_a_tone() -> None:
     )
 
 
-def test_a_melody_is_the_sum_of_its_strikes() -> None:
+def test_a_melody_is_the_sum_of_its_strikes():
     design = small_design()
     solid, listening = design_solid()
     hits = [
@@ -207,7 +202,7 @@ def test_a_melody_is_the_sum_of_its_strikes() -> None:
     np.testing.assert_allclose(render(solid, hits, 0.6, listening=listening), single, atol=1e-12)
 
 
-def test_a_longer_contact_excites_high_modes_less() -> None:
+def test_a_longer_contact_excites_high_modes_less():
     solid, _ = design_solid()
     hits = [Hit(0.0, small_design().strikes[0].position, np.array([1.0, 1.0, 1.0]))]
     impulse, push = (render(solid, hits, 0.4, contact_seconds=c) for c in (0.0, 4e-3))
@@ -224,9 +219,7 @@ def run(arguments: list[object]) -> int:
     return main([str(argument) for argument in arguments])
 
 
-def test_a_point_is_named_in_the_coordinates_of_the_mesh(
-    tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_a_point_is_named_in_the_coordinates_of_the_mesh(tmp_path, capsys):
     design = small_design()
     write_design(tmp_path / "mm.h5", replace(design, settings={**design.settings, "unit": 1e-3}))
     corner = design.strikes[0].position
@@ -242,9 +235,7 @@ def test_a_point_is_named_in_the_coordinates_of_the_mesh(
     assert "is 0.05 m off the surface" in said.err
 
 
-def test_partials_of_a_rendered_file_are_the_modes(
-    tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_partials_of_a_rendered_file_are_the_modes(tmp_path, capsys):
     design = small_design()
     write_design(tmp_path / "design.h5", design)
     out = tmp_path / "hit.wav"
@@ -267,7 +258,7 @@ def test_partials_of_a_rendered_file_are_the_modes(
     assert len(find_peaks(spectrum, height=0.02 * spectrum.max(), distance=20)[0]) <= N_MODES
 
 
-def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_the_solver_s_modes_can_be_heard(tmp_path, capsys):
     model = uniform_box(6, 4, 2, 0.04)
     result = solve(model, modes=RIGID_MODES + N_MODES, method="slepc")
     path, out = tmp_path / "modes.h5", tmp_path / "hit.wav"
@@ -293,7 +284,7 @@ def test_the_solver_s_modes_can_be_heard(tmp_path: Path, capsys: pytest.CaptureF
     assert max(printed["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
 
 
-def test_modes_alone_stand_beside_the_sound(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_modes_alone_stand_beside_the_sound(tmp_path, capsys):
     write_design(tmp_path / "design.h5", small_design())
     out, alone, bare = (tmp_path / f"{name}.wav" for name in ("hit", "modes", "bare"))
     words = ["render", tmp_path / "design.h5", "--target", "corner", "--seconds", 0.4, "--json"]
@@ -309,9 +300,7 @@ def test_modes_alone_stand_beside_the_sound(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize("strength", [1e-3, 100.0])
-def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(
-    tmp_path: Path, strength: float, capsys: pytest.CaptureFixture
-) -> None:
+def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(tmp_path, strength, capsys):
     write_design(tmp_path / "design.h5", small_design())
     words = ["render", tmp_path / "design.h5", "--target", "side", "--strength", strength]
     plain, scaled, alone = (tmp_path / f"{name}.wav" for name in ("plain", "scaled", "alone"))
@@ -327,7 +316,7 @@ def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(
     assert f"scaled by {told['scale']:.4g}" in capsys.readouterr().out
 
 
-def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
+def test_modes_too_damped_to_oscillate_are_left_out(tmp_path):
     model = uniform_box(4, 3, 2, 0.05)
     result = solve(model, modes=RIGID_MODES + 4, method="slepc")
     path = tmp_path / "modes.h5"
@@ -362,16 +351,14 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path: Path) -> None:
         (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
     ],
 )
-def test_mistakes_are_answered_in_one_sentence(
-    tmp_path: Path, words: list[object], complaint: str, refuses
-) -> None:
+def test_mistakes_are_answered_in_one_sentence(tmp_path, words, complaint, refuses):
     write_design(tmp_path / "design.h5", small_design())
     command = ["render", tmp_path / "design.h5", "--out", tmp_path / "hit.wav"]
     assert re.search(complaint, refuses(main, *command, *words))
     assert [path.name for path in tmp_path.iterdir()] == ["design.h5"]
 
 
-def test_other_files_are_refused(tmp_path: Path, refuses) -> None:
+def test_other_files_are_refused(tmp_path, refuses):
     (tmp_path / "clip.h5").write_text("no HDF5")
     (tmp_path / "empty.h5").touch()
     (tmp_path / "loop.h5").symlink_to("loop.h5")

@@ -1,7 +1,5 @@
 """Many strikes in one sound, as a table says."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -28,7 +26,7 @@ def written(folder: Path, *lines: str) -> Path:
     return path
 
 
-def test_lines_are_strikes_in_their_order(tmp_path: Path) -> None:
+def test_lines_are_strikes_in_their_order(tmp_path):
     strikes = read_strikes(written(tmp_path, HEADER, *LINES))
     assert [strike.line for strike in strikes] == [2, 3, 4, 6]
     assert [strike.seconds for strike in strikes] == [0.0, 0.3, 0.15, 0.3]
@@ -37,14 +35,14 @@ def test_lines_are_strikes_in_their_order(tmp_path: Path) -> None:
     assert [strike.point for strike in strikes] == points
 
 
-def test_columns_that_are_not_needed_may_be_left_out(tmp_path: Path) -> None:
+def test_columns_that_are_not_needed_may_be_left_out(tmp_path):
     text = "\ufefftarget,time_seconds\r\ncorner,1e-1\r\n"
     (tmp_path / "strikes.csv").write_bytes(text.encode())
     (strike,) = read_strikes(tmp_path / "strikes.csv")
     assert strike == (2, 0.1, Point("corner"), None)
 
 
-def test_the_sound_is_that_of_all_strikes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_the_sound_is_that_of_all_strikes(tmp_path, capsys):
     design = small_design()
     write_design(tmp_path / "design.h5", design)
     path, out = written(tmp_path, HEADER, *LINES), tmp_path / "all.wav"
@@ -95,9 +93,7 @@ def test_the_sound_is_that_of_all_strikes(tmp_path: Path, capsys: pytest.Capture
         ([HEADER, *["0,corner,,,,,"] * 10_001], "line 10002: more than 10,000 strikes"),
     ],
 )
-def test_bad_lines_are_refused_with_their_number(
-    tmp_path: Path, lines: list[str], complaint: str, refuses
-) -> None:
+def test_bad_lines_are_refused_with_their_number(tmp_path, lines, complaint, refuses):
     write_design(tmp_path / "design.h5", small_design())
     path = written(tmp_path, *lines)
     words = ["render", tmp_path / "design.h5", "--strikes", path, "--out", tmp_path / "all.wav"]
@@ -106,7 +102,7 @@ def test_bad_lines_are_refused_with_their_number(
     assert not (tmp_path / "all.wav").exists()
 
 
-def test_what_is_no_list_is_refused(tmp_path: Path, refuses) -> None:
+def test_what_is_no_list_is_refused(tmp_path, refuses):
     write_design(tmp_path / "design.h5", small_design())
     (tmp_path / "large.csv").write_bytes(b"0" * ((1 << 22) + 1))
     for name, complaint in (

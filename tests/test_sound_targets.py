@@ -1,7 +1,5 @@
 """Clips share frequencies; each has its say in which modes are kept."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -47,8 +45,7 @@ def test_modes_that_cannot_be_told_apart_are_shared():
 
 def test_shared_frequency_leans_to_the_clip_that_has_more_of_it():
     strong, weak = sound([200.0, 1000.0], [0.1, 1.0]), sound([300.0, 1001.0], [1.0, 0.01])
-    targets = share_frequencies("ab", [strong, weak])
-    assert 1000.0 < targets.frequencies[-1] < 1000.1
+    assert 1000.0 < share_frequencies("ab", [strong, weak]).frequencies[-1] < 1000.1
 
 
 def test_modes_of_one_clip_stay_apart_and_the_closest_ones_meet():
@@ -109,8 +106,7 @@ def test_modes_too_close_for_a_design_count_once():
     targets = share_frequencies(["one"], [beating], "auto")
     np.testing.assert_allclose(targets.frequencies, [200.0, 1002.9, 1006.0])
     np.testing.assert_array_equal(targets.amplitudes, [[1.0, 0.6, 0.3]])
-    other = sound([600.0, 1005.4], [0.5, 0.4])
-    targets = share_frequencies("ab", [beating, other], "auto")
+    targets = share_frequencies("ab", [beating, sound([600.0, 1005.4], [0.5, 0.4])], "auto")
     assert (targets.amplitudes[1] > 0.0).sum() == 2
 
 

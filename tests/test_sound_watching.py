@@ -1,7 +1,5 @@
 """A search that goes on while its project is edited, and what is written of it."""
 
-from __future__ import annotations
-
 import copy
 import os
 import signal
@@ -29,7 +27,7 @@ FREQUENCIES = np.array([500.0, 1200.0, 1900.0, 2600.0, 3300.0, 4100.0])
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch) -> Path:
     """A project with its clips; what is waited for comes at once."""
     monkeypatch.chdir(tmp_path)
     for name in ("LOOK_SECONDS", "WRITE_SECONDS"):
@@ -54,9 +52,7 @@ def looks(edited: EditedProject, count: int = 3) -> list[bool]:
     return found
 
 
-def test_an_edit_is_taken_up_once_and_when_it_is_whole(
-    folder: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_an_edit_is_taken_up_once_and_when_it_is_whole(folder, capsys):
     path = folder / "project.yaml"
     edited = EditedProject(path, lambda: load_project(path))
     assert looks(edited) == [False] * 3
@@ -80,9 +76,7 @@ def test_an_edit_is_taken_up_once_and_when_it_is_whole(
         EditedProject(folder / "other.yaml", lambda: load_project(folder / "other.yaml"))
 
 
-def test_sounds_follow_the_edits_until_somebody_interrupts(
-    folder: Path, capfd: pytest.CaptureFixture
-) -> None:
+def test_sounds_follow_the_edits_until_somebody_interrupts(folder, capfd):
     """Targets change, a broken file and one of no solid go by, then the solid changes."""
     path, said = folder / "project.yaml", ""
 
@@ -124,7 +118,7 @@ def test_sounds_follow_the_edits_until_somebody_interrupts(
         assert rate == 44_100 and np.abs(sound).max() > 0.01
 
 
-def test_a_budget_or_the_name_of_a_clip_is_refused(folder: Path, refuses) -> None:
+def test_a_budget_or_the_name_of_a_clip_is_refused(folder, refuses):
     words = ["design", "project.yaml", "--watch", "--out"]
     assert "leave out --seconds" in refuses(main, *words, "design.h5", "--seconds", 5)
     (folder / "end.wav").rename(folder / "design-end.wav")

@@ -1,16 +1,12 @@
 """Processes that are no ranks of a job: alone, and apart from each other."""
 
-from __future__ import annotations
-
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from carillon.processes import mpi_environment
-from tests.patience import HANG_SECONDS
+from tests.programs import python
 
 DIRECTORY = "OMPI_MCA_orte_top_session_dir"
 CHILD = f"""
@@ -30,14 +26,7 @@ subprocess.run([sys.executable, "-c", sys.argv[1]], check=True)
 
 def printed(**variables: str) -> list[tuple[str, ...]]:
     """What a process and one that it starts say of their directories, and of how many they are."""
-    done = subprocess.run(
-        [sys.executable, "-c", PARENT, CHILD],
-        env={**os.environ, **variables},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=HANG_SECONDS,
-    )
+    done = python("-c", PARENT, CHILD, env={**os.environ, **variables}, check=True)
     return [tuple(line.split()) for line in done.stdout.splitlines()]
 
 
@@ -81,19 +70,14 @@ def test_what_a_lone_process_starts_looks_for_networks():
         "print(MPI.COMM_SELF.sendrecv('itself', 0), flush=True)\n"
         f"subprocess.run([sys.executable, '-c', {look!r}], check=True)\n"
     )
-    done = subprocess.run([sys.executable, "-c", lone], capture_output=True, text=True, check=True)
+    done = python("-c", lone, check=True)
     assert done.stdout.split() == ["itself", "None"]
 
 
 def warned(**variables: str) -> str:
     """What a command says that was started with these variables."""
-    done = subprocess.run(
-        [sys.executable, "-m", "carillon", "environment", "--json"],
-        env={**os.environ, **variables},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=HANG_SECONDS,
+    done = python(
+        "-m", "carillon", "environment", "--json", env={**os.environ, **variables}, check=True
     )
     return done.stderr
 

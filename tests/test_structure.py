@@ -1,10 +1,6 @@
 """Which package may import which: every arrow is listed, and none points back."""
 
-from __future__ import annotations
-
 import ast
-import subprocess
-import sys
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
@@ -14,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import studies
+from tests.programs import CHECKOUT, python
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow", "studies")
 
 SURFACE = "carillon.api"
@@ -273,5 +269,5 @@ def test_petsc_and_slepc_are_had_from_one_module_each(library):
 def test_rooms_begin_with_carillon(room):
     """Whose import has libraries, loaded later, read no settings in the present folder."""
     program = f"import sys, {room}; print('carillon.processes.present_folder' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = python("-c", program)
     assert done.stdout == "True\n", done.stderr

@@ -1,7 +1,5 @@
 """Pages of others in the browser that is let in get at nothing, and nothing of theirs runs."""
 
-from __future__ import annotations
-
 import http.server
 import threading
 from collections.abc import Iterator
@@ -50,7 +48,7 @@ def other() -> Iterator[int]:
 
 
 @pytest.fixture(scope="module")
-def context(browser, server: Served) -> Iterator[Any]:
+def context(browser, server) -> Iterator[Any]:
     """Pages of a person who is let in; the first one is the studio's."""
     context = browser.new_context()
     page = context.new_page()
@@ -62,7 +60,7 @@ def context(browser, server: Served) -> Iterator[Any]:
 
 
 @pytest.fixture(params=FOREIGN)
-def foreign(context, other: int, request) -> Any:
+def foreign(context, other, request) -> Any:
     """Another page of that person's, of somebody else."""
     page = context.new_page()
     page.goto(f"http://{request.param}:{other}/")
@@ -70,7 +68,7 @@ def foreign(context, other: int, request) -> Any:
     page.close()
 
 
-def test_the_token_is_gone_from_where_the_page_is(browser, server: Served):
+def test_the_token_is_gone_from_where_the_page_is(browser, server):
     page = browser.new_page()
     page.goto("about:blank")
     page.goto(f"{server.origin}/?token={server.keys.token}")
@@ -83,7 +81,7 @@ def test_the_token_is_gone_from_where_the_page_is(browser, server: Served):
 
 
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
-def test_a_page_of_another_origin_gets_no_websocket(foreign, server: Served, name):
+def test_a_page_of_another_origin_gets_no_websocket(foreign, server, name):
     outcome = foreign.evaluate(
         """(url) => new Promise((done) => {
             const socket = new WebSocket(url);
@@ -97,7 +95,7 @@ def test_a_page_of_another_origin_gets_no_websocket(foreign, server: Served, nam
 
 
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
-def test_a_page_of_another_origin_changes_nothing(foreign, server: Served, name):
+def test_a_page_of_another_origin_changes_nothing(foreign, server, name):
     before = list(server.studio.uploads)
     outcomes = foreign.evaluate(
         """async (url) => {
@@ -129,7 +127,7 @@ def test_a_page_of_another_origin_changes_nothing(foreign, server: Served, name)
     assert server.studio.uploads == before
 
 
-def test_a_page_of_another_origin_shows_and_reads_nothing(foreign, server: Served):
+def test_a_page_of_another_origin_shows_and_reads_nothing(foreign, server):
     outcomes = foreign.evaluate(
         """async (origin) => {
             const found = {};
@@ -160,7 +158,7 @@ def test_a_page_of_another_origin_shows_and_reads_nothing(foreign, server: Serve
     assert "window.studio" not in frame.content() and "importmap" not in frame.content()
 
 
-def test_a_name_that_is_pointed_at_this_machine_gets_nothing(context, server: Served):
+def test_a_name_that_is_pointed_at_this_machine_gets_nothing(context, server):
     """DNS rebinding: to the browser the page is of evil.example, cookies and all."""
     page = context.new_page()
     answer = page.goto(f"http://rebound.example:{server.port}/?token={server.keys.token}")
@@ -219,7 +217,7 @@ def test_nothing_leaves_the_page(context):
     assert outcomes[:2] == ["kept", "kept"]
 
 
-def test_markup_in_names_is_shown_as_text(context, server: Served):
+def test_markup_in_names_is_shown_as_text(context, server):
     page = context.pages[0]
     name = '<img src=x onerror="window.marked=1"></script><script>window.marked=2</script>'
     page.evaluate("(name) => window.studio.connection.call('add_target', {vertex: 3, name})", name)

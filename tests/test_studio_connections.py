@@ -1,7 +1,5 @@
 """Connections of those who are not let in: they end, they make room, and the page still answers."""
 
-from __future__ import annotations
-
 import asyncio
 import resource
 import socket
@@ -62,7 +60,7 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def connections(clock: Clock) -> Connections:
+def connections(clock) -> Connections:
     return Connections(MOST, 10.0, clock.later)
 
 
@@ -133,13 +131,13 @@ def test_descriptors_are_left_for_files(monkeypatch, allowed, most):
 
 
 @pytest.fixture
-def server(connections: Connections) -> Iterator[Served]:
+def server(connections) -> Iterator[Served]:
     with served(connections=connections) as found:
         yield found
 
 
 @pytest.fixture
-def idle(server: Served) -> Iterator[Callable[[int, bytes], list[socket.socket]]]:
+def idle(server) -> Iterator[Callable[[int, bytes], list[socket.socket]]]:
     """Opens connections that say something that is no request, or nothing."""
     with ExitStack() as ending:
 
@@ -165,8 +163,7 @@ def is_ended(stream: socket.socket) -> bool:
 def test_a_flood_without_a_token_keeps_nobody_out(server, connections, idle):
     with server.talk() as page:
         next_event(page, "state")
-        flood = idle(5 * MOST)
-        assert all(map(is_ended, flood[: 4 * MOST]))
+        assert all(map(is_ended, idle(5 * MOST)[: 4 * MOST]))
         assert server.ask("/").status == 200
         assert server.ask(f"/?token={server.keys.token}", headers={"Cookie": None}).status == 200
         assert server.ask("/", headers={"Cookie": None}).status == 403

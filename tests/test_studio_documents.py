@@ -1,7 +1,5 @@
 """What a studio designs: documents, their undo, and files that stay in the workspace."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +11,7 @@ from carillon.errors import UserError
 from sound.project.project import load_project
 from studio.session.document import Document, Material, Target, document_of, merged
 from studio.session.history import LONGEST, History
-from studio.session.workspace import Workspace, require_name
+from studio.session.workspace import Workspace
 
 BELL = Document({"mesh": "builtin:bell", "resolution": 8})
 STRUCK = replace(
@@ -65,8 +63,7 @@ def test_a_history_is_the_same_after_json():
     for document in (STRUCK, replace(STRUCK, material=None), BELL):
         history.do("something", document)
     history.undo()
-    text = json.dumps(history.as_json())
-    assert History.from_json(json.loads(text)) == history
+    assert History.from_json(json.loads(json.dumps(history.as_json()))) == history
 
 
 def test_undo_leads_through_all_that_was_done_and_redo_back():
@@ -123,21 +120,6 @@ def test_nothing_leads_out_of_the_workspace(workspace, name):
         workspace.path(name)
 
 
-@pytest.mark.parametrize(
-    "name", ["", ".", "..", "a/b", "a b", "é", "a" * 65, "a\n", ".studio", "a.h5"]
-)
-def test_names_of_projects_are_plain(name):
-    with pytest.raises(UserError, match="letters, digits"):
-        require_name(name)
-
-
-def test_uploads_replace_nothing(workspace):
-    assert workspace.put("clip.wav", b"one") == "clip.wav"
-    assert workspace.put("clip.wav", b"one") == "clip.wav"
-    assert workspace.put("clip.wav", b"two") == "clip-2.wav"
-    assert (workspace.folder / "clip.wav").read_bytes() == b"one"
-
-
 def test_one_studio_works_in_a_folder(workspace):
     with pytest.raises(UserError, match="another studio"):
         Workspace(workspace.folder)
@@ -152,15 +134,7 @@ def test_designs_that_nobody_needs_are_removed(workspace):
     assert [path.exists() for path in paths] == [False, True, False]
 
 
-@pytest.mark.parametrize("content", ["", "[1]", "{", "null"])
-def test_a_damaged_session_is_none(workspace, content):
-    workspace.write_session({"name": "a"})
-    assert workspace.read_session() == {"name": "a"}
-    (workspace.folder / ".studio" / "session.json").write_text(content)
-    assert workspace.read_session() is None
-
-
-def test_projects_are_listed_without_what_is_the_studio_s_own(workspace: Workspace):
+def test_projects_are_listed_without_what_is_the_studio_s_own(workspace):
     for name in ("b", "a"):
         workspace.write_project(name, STRUCK.described())
     (workspace.folder / "folder.yaml").mkdir()

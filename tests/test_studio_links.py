@@ -1,13 +1,10 @@
 """Folders that came from others: no link, pipe or session in them leads the studio elsewhere."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import os
 import socket
 from collections.abc import Callable
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -34,7 +31,7 @@ DOCUMENT = {
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path) -> Path:
     """A workspace with a project; beside it a home with a diary and a folder of data."""
     home, folder = tmp_path / "home", tmp_path / "pans"
     for each in (home, home / "data", home / "data" / "designs", folder):
@@ -46,7 +43,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def kept(tmp_path: Path):
+def kept(tmp_path):
     """What is outside of the workspace stays as it is."""
     yield
     files = [path for path in (tmp_path / "home").rglob("*") if path.is_file()]
@@ -54,23 +51,16 @@ def kept(tmp_path: Path):
     assert all(path.read_text() == DIARY for path in files)
 
 
-@asynccontextmanager
-async def opened(folder: Path, what: str | None = None):
-    """A studio that computes nothing."""
-    studio = open_studio(what, folder)
-    try:
-        yield studio
-    finally:
-        await studio.close()
-
-
 def begin_and_end(folder: Path, what: str | None = None, do: Callable | None = None) -> None:
     """Open a studio, do something with it, and close it, which saves and tidies up."""
 
     async def play():
-        async with opened(folder, what) as studio:
+        studio = open_studio(what, folder)
+        try:
             if do is not None:
                 await do(studio)
+        finally:
+            await studio.close()
 
     asyncio.run(play())
 
@@ -168,8 +158,7 @@ def test_other_writers_leave_planted_temporary_names_alone(folder):
 
 
 def test_designs_that_are_links_are_neither_written_to_nor_removed(folder):
-    link = plant(folder, f"{OWN_FOLDER}/designs/1.h5", "new.h5")
-    own = link.parent
+    own = plant(folder, f"{OWN_FOLDER}/designs/1.h5", "new.h5").parent
     for name in ("notes.h5", "²" + ".h5", "9" * 190 + ".h5", "7.h5"):
         (own / name).write_text("")
 
@@ -246,10 +235,13 @@ def test_a_link_within_the_workspace_is_read_and_not_written_to(folder):
     assert "builtin:bar" in (folder / "other.yaml").read_text()
 
 
-@pytest.mark.parametrize("name", ["", ".", "..", "a/b", "../pan", "a\0b", "a\nb", "pan.yaml", "é"])
+@pytest.mark.parametrize(
+    "name",
+    ["", ".", "..", "a/b", "../pan", "a\0b", "a\nb", "a\n", "a b", "pan.yaml", "é", "a" * 65, ".a"],
+)
 def test_projects_have_plain_names(folder, name):
     async def saved(studio):
-        with pytest.raises(UserError):
+        with pytest.raises(UserError, match="letters, digits"):
             await written(studio, name)
 
     begin_and_end(folder, str(folder / "pan.yaml"), saved)
@@ -314,6 +306,8 @@ def test_a_session_that_names_files_elsewhere_is_refused(folder, what, is_before
 MALFORMED = {
     "nothing": "",
     "a list": "[]",
+    "null": "null",
+    "half an object": "{",
     "deep": "[" * 100_000,
     "no history": '{"name": "a", "saved": false}',
     "settings of another kind": {"settings": {"mesh": "builtin:bar", "material": 5}},

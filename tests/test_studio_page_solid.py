@@ -1,7 +1,5 @@
 """The solid on the studio's page, in a browser: what is seen, struck, placed, dropped and told."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np
@@ -151,8 +149,7 @@ def test_the_map_gets_lighter_by_even_steps(page):
     )
     colours = np.reshape(told["map"], (-1, 3))
     assert colours.min() >= 0.0 and colours.max() <= 1.0
-    luminance = colours @ [0.2126, 0.7152, 0.0722]
-    assert np.all(np.diff(luminance) > 0.0)
+    assert np.all(np.diff(colours @ [0.2126, 0.7152, 0.0722]) > 0.0)
     steps = np.linalg.norm(np.diff(oklab(colours), axis=0), axis=1)
     assert np.ptp(steps) < 0.2 * steps.mean()
     assert told["uniform"] == pytest.approx([8.5, 9.5])
@@ -251,8 +248,7 @@ def test_two_fingers_turn_and_one_strikes(browser):
         send("touchStart", (x, y), (x + 60, y))
         send("touchMove", (x + 40, y), (x + 140, y))
         send("touchEnd")
-        after = direction(page)
-        assert np.linalg.norm(after - before) > 0.05 * np.linalg.norm(before)
+        assert np.linalg.norm(direction(page) - before) > 0.05 * np.linalg.norm(before)
         assert len(strikes(page)) == 1
         page.context.close()
 
@@ -304,8 +300,7 @@ def test_the_view_is_used_by_keys_alone(page, studio):
     start = direction(page)
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowUp")
-    turned = direction(page)
-    assert np.linalg.norm(turned - start) > 0.05 * np.linalg.norm(start)
+    assert np.linalg.norm(direction(page) - start) > 0.05 * np.linalg.norm(start)
     page.keyboard.press("+")
     assert np.linalg.norm(direction(page)) < 0.95 * np.linalg.norm(start)
     page.keyboard.press("Shift+ArrowDown")

@@ -1,8 +1,5 @@
 """The studio's panels in a real browser: what they show of a state, and what they ask for."""
 
-from __future__ import annotations
-
-import importlib.util
 import re
 import time
 from pathlib import Path
@@ -18,7 +15,7 @@ from sound.design.cents import cents as cents_of
 from sound.project.project import Project
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
 from tests.patience import PATIENCE_SECONDS
-from tests.studio_pages import TWO_FRAMES
+from tests.studio_pages import TWO_FRAMES, axe_finds
 
 pytestmark = pytest.mark.nightly(unless=("studio",))
 
@@ -54,6 +51,11 @@ def panels(wide):
     assert wide.faults == []
 
 
+@pytest.fixture
+def page(panels):
+    return panels.page
+
+
 def until(panels, holds) -> None:
     """Wait until something holds, while the page goes on."""
     end = time.monotonic() + PATIENCE_SECONDS
@@ -82,15 +84,14 @@ def ink(panels, place: str) -> dict[str, int]:
 # Targets
 
 
-def test_targets_are_listed_with_their_clips(panels):
-    rows = panels.page.locator(".target-list > li")
+def test_targets_are_listed_with_their_clips(page):
+    rows = page.locator(".target-list > li")
     expect(rows).to_have_text(["rimplate.wav, 4 modes", "handleno clip"])
-    expect(panels.page.get_by_label("Name").first).to_have_value("pan")
-    expect(panels.page.locator("#target-name")).to_have_value("rim")
+    expect(page.get_by_label("Name").first).to_have_value("pan")
+    expect(page.locator("#target-name")).to_have_value("rim")
 
 
-def test_the_arrow_keys_choose_a_target(panels):
-    page = panels.page
+def test_the_arrow_keys_choose_a_target(page):
     page.locator(".target-list input").first.focus()
     page.keyboard.press("ArrowDown")
     expect(page.locator("#target-name")).to_have_value("handle")
@@ -98,8 +99,7 @@ def test_the_arrow_keys_choose_a_target(panels):
     expect(page.locator("#panel-clip")).to_contain_text("handle has no clip yet")
 
 
-def test_a_target_is_renamed_moved_and_removed(panels):
-    page = panels.page
+def test_a_target_is_renamed_moved_and_removed(panels, page):
     page.fill("#target-name", "bell's rim")
     page.keyboard.press("Enter")
     assert last_call(panels) == ("change_target", {"target": "rim", "name": "bell's rim"})
@@ -112,43 +112,41 @@ def test_a_target_is_renamed_moved_and_removed(panels):
     assert last_call(panels, 3) == ("remove_target", {"target": "rim"})
 
 
-def test_a_name_that_is_refused_goes_back(panels):
+def test_a_name_that_is_refused_goes_back(panels, page):
     panels.refused["change_target"] = "There is a target handle already; choose another name."
-    panels.page.fill("#target-name", "handle")
-    panels.page.keyboard.press("Enter")
-    expect(panels.page.locator(".message.error")).to_contain_text("There is a target handle")
-    expect(panels.page.locator("#target-name")).to_have_value("rim")
+    page.fill("#target-name", "handle")
+    page.keyboard.press("Enter")
+    expect(page.locator(".message.error")).to_contain_text("There is a target handle")
+    expect(page.locator("#target-name")).to_have_value("rim")
 
 
-def test_the_point_struck_last_becomes_a_target(panels):
-    add = panels.page.get_by_role("button", name="Add the point struck last")
+def test_the_point_struck_last_becomes_a_target(panels, page):
+    add = page.get_by_role("button", name="Add the point struck last")
     expect(add).to_be_disabled()
-    panels.page.evaluate("studio.selection.set({ vertex: 2 })")
+    page.evaluate("studio.selection.set({ vertex: 2 })")
     add.click()
     assert last_call(panels) == ("add_target", {"vertex": 2})
 
 
 def test_every_part_of_a_clip_can_be_heard_and_the_solid(panels):
-    page = panels.page
-    group = page.get_by_role("group", name="Listen")
+    group = panels.page.get_by_role("group", name="Listen")
     for name in ("Clip", "Modes", "Rest", "Noise", "Solid"):
         group.get_by_role("button", name=name).click()
     parts = [["play", f"/clip/c1/{part}"] for part in ("sound", "modes", "rest", "noise")]
     assert panels.heard() == [*parts, ["strike", 1, 1]]
 
 
-def test_of_a_clip_that_is_being_listened_to_only_the_clip_is_heard(panels):
+def test_of_a_clip_that_is_being_listened_to_only_the_clip_is_heard(panels, page):
     clip = ready_clip() | {"phase": "listening", "modes": []}
     panels.open(state(clips=[clip], wanted=None))
-    group = panels.page.get_by_role("group", name="Listen")
+    group = page.get_by_role("group", name="Listen")
     expect(group.get_by_role("button", name="Clip")).to_be_enabled()
     expect(group.get_by_role("button", name="Modes")).to_be_disabled()
-    expect(panels.page.locator("#panel-clip")).to_contain_text("being found")
-    expect(panels.page.locator("#search-state")).to_contain_text("handle does not count")
+    expect(page.locator("#panel-clip")).to_contain_text("being found")
+    expect(page.locator("#search-state")).to_contain_text("handle does not count")
 
 
-def test_a_clip_is_chosen_taken_from_a_file_and_recorded(panels):
-    page = panels.page
+def test_a_clip_is_chosen_taken_from_a_file_and_recorded(panels, page):
     page.select_option("#target-clip", "")
     assert last_call(panels) == ("change_target", {"target": "rim", "clip": None})
     sound = {"name": "a b.wav", "mimeType": "audio/wav", "buffer": b"RIFF"}
@@ -167,8 +165,7 @@ def test_a_clip_is_chosen_taken_from_a_file_and_recorded(panels):
     expect(page.locator("#record-clip")).to_be_focused()
 
 
-def test_a_recording_is_discarded_or_ends_by_itself(panels):
-    page = panels.page
+def test_a_recording_is_discarded_or_ends_by_itself(panels, page):
     page.click("#record-clip")
     page.get_by_role("button", name="Discard", exact=True).first.click()
     expect(page.locator(".recording")).to_be_hidden()
@@ -179,8 +176,7 @@ def test_a_recording_is_discarded_or_ends_by_itself(panels):
     assert last_call(panels) == ("change_target", {"target": "rim", "clip": "c10"})
 
 
-def test_modes_taken_are_a_number_or_all(panels):
-    page = panels.page
+def test_modes_taken_are_a_number_or_all(panels, page):
     page.fill("#target-modes", "3")
     page.keyboard.press("Tab")
     assert last_call(panels) == ("change_target", {"target": "rim", "modes": 3})
@@ -199,8 +195,7 @@ def test_a_clip_may_be_said_to_be_clipped(panels):
 # Clip
 
 
-def test_modes_of_a_clip_are_told(panels):
-    page = panels.page
+def test_modes_of_a_clip_are_told(page):
     expect(page.locator("#panel-clip .figure-line")).to_have_text(
         "plate.wav: 4 of 4 modes used; all explain 13.6 dB"
     )
@@ -211,8 +206,7 @@ def test_modes_of_a_clip_are_told(panels):
     expect(first).to_have_text(["660.0", "8.0", "0.86", "\u22126.0"])
 
 
-def test_a_mode_is_left_out_and_taken_back(panels):
-    page = panels.page
+def test_a_mode_is_left_out_and_taken_back(panels, page):
     page.get_by_text("Modes of the clip").first.click()
     page.get_by_label("Use 990.0 Hz").uncheck()
     assert last_call(panels) == ("change_target", {"target": "rim", "without": [990.0]})
@@ -226,28 +220,28 @@ def test_a_mode_is_left_out_and_taken_back(panels):
     assert last_call(panels, 2) == ("change_target", {"target": "rim", "without": []})
 
 
-def test_a_mode_that_cannot_be_left_out_stays(panels):
+def test_a_mode_that_cannot_be_left_out_stays(panels, page):
     panels.refused["change_target"] = "Two modes have to stay."
-    panels.page.get_by_text("Modes of the clip").first.click()
-    panels.page.get_by_label("Use 990.0 Hz").click()
-    expect(panels.page.locator(".message.error")).to_contain_text("Two modes have to stay.")
-    expect(panels.page.get_by_label("Use 990.0 Hz")).to_be_checked()
+    page.get_by_text("Modes of the clip").first.click()
+    page.get_by_label("Use 990.0 Hz").click()
+    expect(page.locator(".message.error")).to_contain_text("Two modes have to stay.")
+    expect(page.get_by_label("Use 990.0 Hz")).to_be_checked()
 
 
-def test_a_mode_of_a_clip_is_heard_alone(panels):
-    panels.page.get_by_text("Modes of the clip").first.click()
-    panels.page.get_by_role("button", name="990.0 Hz alone").click()
+def test_a_mode_of_a_clip_is_heard_alone(panels, page):
+    page.get_by_text("Modes of the clip").first.click()
+    page.get_by_role("button", name="990.0 Hz alone").click()
     [[what, seconds]] = panels.heard()
     assert what == "play"
     assert seconds == pytest.approx(np.log(1000) / 8, abs=1e-3)
 
 
-def test_a_clip_that_failed_says_why(panels):
+def test_a_clip_that_failed_says_why(panels, page):
     clip = ready_clip() | {"phase": "failed", "message": "plate.wav is silent.", "modes": []}
     panels.open(state(clips=[clip], targets=[target("rim", 1, "c1")]))
-    expect(panels.page.locator("#panel-clip")).to_contain_text("plate.wav is silent.")
-    expect(panels.page.locator("#optimise")).to_be_disabled()
-    expect(panels.page.locator("#search-state")).to_contain_text("plate.wav cannot be used")
+    expect(page.locator("#panel-clip")).to_contain_text("plate.wav is silent.")
+    expect(page.locator("#optimise")).to_be_disabled()
+    expect(page.locator("#search-state")).to_contain_text("plate.wav cannot be used")
 
 
 # Spectrum and errors
@@ -269,8 +263,7 @@ def test_without_clips_only_the_solid_is_drawn(panels):
     expect(panels.page.locator("#panel-errors .hint").first).to_be_visible()
 
 
-def test_a_mode_under_the_pointer_is_read_out(panels):
-    page = panels.page
+def test_a_mode_under_the_pointer_is_read_out(page):
     over = page.locator("#panel-spectrum .u-over")
     over.scroll_into_view_if_needed()
     box = over.bounding_box()
@@ -282,9 +275,8 @@ def test_a_mode_under_the_pointer_is_read_out(panels):
     expect(page.locator("#panel-errors tr.pointed th")).to_contain_text("3")
 
 
-def test_parts_of_a_spectrum_can_be_seen_larger(panels):
+def test_parts_of_a_spectrum_can_be_seen_larger(panels, page):
     """By dragging and by buttons; a search that goes on leaves the part as it is."""
-    page = panels.page
     panel = page.locator("#panel-spectrum")
     low, high = WANTED[0] / 1.2, WANTED[-1] * 1.2
     shown = panel.locator(".zoom .hint")
@@ -322,39 +314,37 @@ def test_parts_of_a_spectrum_can_be_seen_larger(panels):
     expect(shown).to_have_text("all frequencies")
 
 
-def test_errors_are_told_and_the_worst_are_marked(panels):
-    rows = panels.page.locator("#panel-errors tbody tr")
+def test_errors_are_told_and_the_worst_are_marked(page):
+    rows = page.locator("#panel-errors tbody tr")
     expect(rows.nth(2).locator("td.number")).to_have_text(
         ["990.0", "945.3", "\u221280.0", "\u22120.45", "+6.0"]
     )
     rms = np.sqrt((30.0**2 + 80.0**2 + 3.0**2) / 4)
-    expect(panels.page.locator("#panel-errors .figure-line")).to_have_text(
+    expect(page.locator("#panel-errors .figure-line")).to_have_text(
         f"{rms:.1f} cents rms over 4 modes"
     )
     # Those that are not heard to be off are not marked.
-    marks = panels.page.get_by_label("among the farthest off")
-    expect(marks).to_have_count(2)
+    expect(page.get_by_label("among the farthest off")).to_have_count(2)
 
 
-def test_levels_are_those_at_the_selected_target(panels):
+def test_levels_are_those_at_the_selected_target(page):
     # At the handle all are wanted as loud; the solid has 0.5, 0.25, 0.2 and 0.01 everywhere.
-    panels.page.evaluate("studio.selection.set({ target: 'handle' })")
-    levels = panels.page.locator("#panel-errors td.loudness")
+    page.evaluate("studio.selection.set({ target: 'handle' })")
+    levels = page.locator("#panel-errors td.loudness")
     expect(levels).to_have_text(["0.0", "\u22126.0", "\u22128.0", "\u221234.0"])
 
 
-def test_without_a_target_the_spectrum_is_that_of_the_point_struck_last(panels):
+def test_without_a_target_the_spectrum_is_that_of_the_point_struck_last(panels, page):
     panels.open(state(targets=[], clips=[], wanted=None))
     panels.tell(bank(wanted=False))
-    spectrum = panels.page.locator("#panel-spectrum")
+    spectrum = page.locator("#panel-spectrum")
     expect(spectrum).to_contain_text("At the first point")
-    panels.page.evaluate("studio.selection.set({ vertex: 2 })")
+    page.evaluate("studio.selection.set({ vertex: 2 })")
     expect(spectrum).to_contain_text("At the point struck last")
     assert ink(panels, "#panel-spectrum")["red"] > 100
 
 
-def test_a_mode_of_the_solid_is_heard_alone(panels):
-    page = panels.page
+def test_a_mode_of_the_solid_is_heard_alone(panels, page):
     alone = page.get_by_role("button", name="Mode 2 alone")
     alone.click()
     expect(alone).to_have_attribute("aria-pressed", "true")
@@ -379,8 +369,7 @@ def test_the_page_reckons_bark_and_cents_as_the_cost_does(panels):
 # Cost
 
 
-def test_the_cost_is_drawn_and_told(panels):
-    page = panels.page
+def test_the_cost_is_drawn_and_told(panels, page):
     panels.tell(progress(0.5, 2.0))
     panels.tell(progress(1.0, 1.0))
     line = page.locator("#panel-cost .figure-line")
@@ -396,8 +385,7 @@ def test_the_cost_is_drawn_and_told(panels):
 # Settings
 
 
-def test_only_what_was_changed_is_sent(panels):
-    page = panels.page
+def test_only_what_was_changed_is_sent(panels, page):
     page.get_by_label("Resolution").fill("40")
     page.get_by_label("Weight of amplitudes").fill("2.5e1")
     page.get_by_label("Density").fill("1000")
@@ -429,8 +417,7 @@ def test_only_what_was_changed_is_sent(panels):
         ("Time of a search", "0", "found 0, expected a number of above 0"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_a_sentence(panels, label, typed, said):
-    page = panels.page
+def test_what_does_not_fit_is_refused_with_a_sentence(panels, page, label, typed, said):
     field = page.get_by_label(label, exact=label == "Modes").first
     field.fill(typed)
     page.get_by_role("button", name="Apply").click()
@@ -441,8 +428,7 @@ def test_what_does_not_fit_is_refused_with_a_sentence(panels, label, typed, said
     assert panels.calls == []
 
 
-def test_empty_fields_and_words_are_sent_as_such(panels):
-    page = panels.page
+def test_empty_fields_and_words_are_sent_as_such(panels, page):
     page.get_by_label("Time of a search").fill("")
     page.get_by_label("Coarse solid").select_option("none")
     page.keyboard.press("Tab")
@@ -451,24 +437,22 @@ def test_empty_fields_and_words_are_sent_as_such(panels):
     assert last_call(panels) == ("change_settings", sent)
 
 
-def test_what_is_typed_outlives_a_new_state_and_can_be_discarded(panels):
-    page = panels.page
+def test_what_is_typed_outlives_a_new_state_and_can_be_discarded(panels, page):
     page.get_by_label("Resolution").fill("40")
-    settings = panels.state["settings"] | {"resolution": 20, "density": 7800.0}
-    panels.change(settings=settings)
+    panels.change(settings=panels.state["settings"] | {"resolution": 20, "density": 7800.0})
     expect(page.get_by_label("Density")).to_have_value("7800")
     expect(page.get_by_label("Resolution")).to_have_value("40")
     page.locator("#panel-settings").get_by_role("button", name="Discard").click()
     expect(page.get_by_label("Resolution")).to_have_value("20")
 
 
-def test_settings_that_the_server_refuses_wait_with_its_sentence(panels):
+def test_settings_that_the_server_refuses_wait_with_its_sentence(panels, page):
     panels.refused["change_settings"] = "weights: expected at least one of them to be 1e-12 or more"
-    panels.page.get_by_label("Weight of frequencies").fill("0")
-    panels.page.get_by_role("button", name="Apply").click()
-    expect(panels.page.locator(".form-said")).to_contain_text("weights: expected at least one")
-    expect(panels.page.get_by_label("Weight of frequencies")).to_have_value("0")
-    expect(panels.page.get_by_role("button", name="Apply")).to_be_enabled()
+    page.get_by_label("Weight of frequencies").fill("0")
+    page.get_by_role("button", name="Apply").click()
+    expect(page.locator(".form-said")).to_contain_text("weights: expected at least one")
+    expect(page.get_by_label("Weight of frequencies")).to_have_value("0")
+    expect(page.get_by_role("button", name="Apply")).to_be_enabled()
 
 
 NUMBERS = ["", "0", "-1", "1", "2", "2.5", "1e3", "30.0", "0.3", "0.5", "1e-5", "1e30", "auto", "x"]
@@ -511,39 +495,35 @@ def _fits(text: str, schema) -> bool:
 # The design as a whole
 
 
-def test_a_search_is_started_and_stopped(panels):
+def test_a_search_is_started_and_stopped(panels, page):
     panels.open(state(targets=[target("rim", 1, "c1")]))
-    button = panels.page.locator("#optimise")
+    button = page.locator("#optimise")
     button.click()
     assert last_call(panels) == ("optimise", {})
     panels.change(search={"phase": "running", "message": None})
     expect(button).to_have_text("Stop")
     panels.tell(progress(12.0, 0.3))
-    expect(panels.page.locator("#search-state")).to_have_text(
-        "The material is being sought for 12 s."
-    )
+    expect(page.locator("#search-state")).to_have_text("The material is being sought for 12 s.")
     button.click()
     assert last_call(panels, 2) == ("stop", {})
     panels.change(search={"phase": "idle", "message": None})
     expect(button).to_have_text("Optimise")
 
 
-def test_without_a_solid_it_says_what_is_missing(panels):
-    empty = state(solid=None, targets=[], clips=[], wanted=None, name="")
-    panels.open(empty)
-    expect(panels.page.locator("#search-state")).to_have_text("Open a solid first.")
-    expect(panels.page.locator("#optimise")).to_be_disabled()
+def test_without_a_solid_it_says_what_is_missing(panels, page):
+    panels.open(state(solid=None, targets=[], clips=[], wanted=None, name=""))
+    expect(page.locator("#search-state")).to_have_text("Open a solid first.")
+    expect(page.locator("#optimise")).to_be_disabled()
 
 
-def test_the_fine_solid_is_asked_for(panels):
-    panels.page.get_by_label("Fine solid:").check()
+def test_the_fine_solid_is_asked_for(panels, page):
+    page.get_by_label("Fine solid:").check()
     assert last_call(panels) == ("fine", {"on": True})
     panels.change(fine={"on": True, "phase": "working", "message": None})
-    expect(panels.page.locator("#panel-project")).to_contain_text("It is being computed")
+    expect(page.locator("#panel-project")).to_contain_text("It is being computed")
 
 
-def test_a_project_is_saved_and_opened(panels):
-    page = panels.page
+def test_a_project_is_saved_and_opened(panels, page):
     page.get_by_text("Save, open, export").click()
     page.fill("#project-name-input", "pan 2")
     page.keyboard.press("Enter")
@@ -557,8 +537,7 @@ def test_a_project_is_saved_and_opened(panels):
     assert last_call(panels, 2) == ("open_project", {"project": "e1"})
 
 
-def test_exports_are_downloads_and_refusals_are_told(panels):
-    page = panels.page
+def test_exports_are_downloads_and_refusals_are_told(panels, page):
     page.get_by_text("Save, open, export").click()
     with page.expect_download() as download:
         page.get_by_role("button", name="Design (HDF5)").click()
@@ -570,23 +549,22 @@ def test_exports_are_downloads_and_refusals_are_told(panels):
     panels.faults.clear()
 
 
-def test_the_material_is_forgotten(panels):
-    panels.page.get_by_text("Save, open, export").click()
-    panels.page.get_by_role("button", name="Forget the material").click()
+def test_the_material_is_forgotten(panels, page):
+    page.get_by_text("Save, open, export").click()
+    page.get_by_role("button", name="Forget the material").click()
     assert last_call(panels) == ("forget_material", {})
 
 
 # Comparing
 
 
-def test_clip_and_solid_are_heard_in_turn(panels):
-    panels.page.get_by_role("button", name="Clip, then solid").click()
-    until(panels, lambda: panels.page.evaluate("window.heard.length") == 2)
+def test_clip_and_solid_are_heard_in_turn(panels, page):
+    page.get_by_role("button", name="Clip, then solid").click()
+    until(panels, lambda: page.evaluate("window.heard.length") == 2)
     assert panels.heard() == [["play", "/clip/c1/sound"], ["strike", 1, 1]]
 
 
-def test_a_swapped_material_is_heard_once_it_is_there(panels):
-    page = panels.page
+def test_a_swapped_material_is_heard_once_it_is_there(panels, page):
     swap = page.get_by_role("button", name="Swap")
     expect(swap).to_be_disabled()
     page.keyboard.press("k")
@@ -602,8 +580,7 @@ def test_a_swapped_material_is_heard_once_it_is_there(panels):
     assert panels.heard() == [["strike", 1, 1]]
 
 
-def test_keys_compare_but_steal_no_typing(panels):
-    page = panels.page
+def test_keys_compare_but_steal_no_typing(panels, page):
     panels.change(heard="A")
     page.locator("body").click(position={"x": 5, "y": 300})
     for key in "cbx":
@@ -620,8 +597,7 @@ def test_keys_compare_but_steal_no_typing(panels):
 # Messages, keys, tour
 
 
-def test_errors_stay_until_dismissed_and_all_are_listed(panels):
-    page = panels.page
+def test_errors_stay_until_dismissed_and_all_are_listed(panels, page):
     panels.tell({"event": "said", "text": "Saved <b>here</b>.", "kind": "note"})
     panels.tell({"event": "said", "text": "The disk is full; free some space.", "kind": "error"})
     expect(page.get_by_role("status").filter(has_text="Saved <b>here</b>.").first).to_be_visible()
@@ -639,8 +615,7 @@ def test_errors_stay_until_dismissed_and_all_are_listed(panels):
     expect(page.locator("dialog[open]")).to_have_count(0)
 
 
-def test_all_keys_are_listed(panels):
-    page = panels.page
+def test_all_keys_are_listed(page):
     page.locator("body").click(position={"x": 5, "y": 300})
     page.keyboard.press("?")
     listed = page.locator("table.keys tbody tr")
@@ -654,8 +629,7 @@ def test_the_tour_begins_by_itself_once(browser):
     with window(browser, tour=True) as panels:
         panels.open()
         page = panels.page
-        card = page.get_by_role("dialog", name="Open a solid")
-        expect(card).to_be_visible()
+        expect(page.get_by_role("dialog", name="Open a solid")).to_be_visible()
         expect(page.locator("#tour-title")).to_be_focused()
         titles = []
         for step in range(1, 6):
@@ -672,8 +646,7 @@ def test_the_tour_begins_by_itself_once(browser):
         expect(page.locator(".tour-card")).to_be_hidden()
 
 
-def test_escape_ends_the_tour_and_the_focus_goes_back(panels):
-    page = panels.page
+def test_escape_ends_the_tour_and_the_focus_goes_back(page):
     page.focus("#help")
     page.keyboard.press("Enter")
     expect(page.locator("#tour-title")).to_be_focused()
@@ -697,23 +670,12 @@ def show_all(panels) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])
 def test_axe_finds_nothing_serious(browser, width, scheme):
-    package = importlib.util.find_spec("axe_playwright_python")
-    if package is None or package.origin is None:
-        pytest.skip("axe-playwright-python is not installed")
-    axe = (Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8")
     with window(browser, width=width, scheme=scheme) as panels:
         panels.open()
         show_all(panels)
-        panels.page.evaluate(axe)
         for opening in ("", "studio.shortcuts.open()", "studio.tour.open()"):
             panels.page.evaluate(opening)
-            found = panels.page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
-            serious = [
-                (each["id"], [node["html"] for node in each["nodes"]])
-                for each in found["violations"]
-                if each["impact"] in ("serious", "critical")
-            ]
-            assert serious == []
+            assert axe_finds(panels.page) == []
             panels.page.evaluate("document.querySelector('dialog[open]')?.close()")
 
 
@@ -731,9 +693,8 @@ def test_nothing_is_wider_than_a_narrow_window(browser):
         assert wide == []
 
 
-def test_the_tab_key_reaches_every_control(panels):
+def test_the_tab_key_reaches_every_control(panels, page):
     show_all(panels)
-    page = panels.page
     enabled = page.evaluate(
         "[...document.querySelectorAll('.side button, .side select, .side summary, .side input')]"
         ".filter((each) => !each.disabled && each.tabIndex >= 0 && each.checkVisibility()"

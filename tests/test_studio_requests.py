@@ -1,7 +1,5 @@
 """Paths, sizes, contents, names and messages that attack the studio's server, which bears them."""
 
-from __future__ import annotations
-
 import re
 import socket
 import threading
@@ -16,12 +14,10 @@ from studio.server.page_files import PAGE, page_table
 from studio.server.uploads import Limits, plain_name
 from studio.session.handlers import HANDLERS
 from tests.patience import wait_for
-from tests.studio_server import SECONDS, Served, next_event, reply_of, served
+from tests.studio_server import ROUTES, SECONDS, Served, next_event, reply_of, served
 
 SMALL = Limits(mesh_bytes=5000, clip_bytes=3000, message_bytes=2000)
 HASTY = replace(SMALL, idle_seconds=0.4, upload_seconds=1.0)
-ROUTES = ("/", "/page/main.js", "/schema.json", "/surface/1", "/clip/c1/sound", "/export/h5")
-"""One of each kind that can be asked for by GET."""
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +80,7 @@ CLIMBS = (
 
 
 @pytest.mark.parametrize("path", CLIMBS)
-def test_no_path_leads_out_of_the_table(server: Served, path):
+def test_no_path_leads_out_of_the_table(server, path):
     head = f"Host: {server.host}\r\nCookie: {server.cookie}\r\nConnection: close\r\n\r\n"
     answer = server.raw(b"GET " + path.encode("latin-1") + b" HTTP/1.1\r\n" + head.encode())
     status, content = answer.split()[1], answer.partition(b"\r\n\r\n")[2]
@@ -100,7 +96,7 @@ def test_the_table_holds_files_of_the_page_alone():
         assert ".." not in address and "node_modules" not in address
 
 
-def test_links_out_of_the_page_are_not_in_the_table(tmp_path: Path):
+def test_links_out_of_the_page_are_not_in_the_table(tmp_path):
     (tmp_path / "page").mkdir()
     (tmp_path / "secret.js").write_text("secret")
     (tmp_path / "page" / "linked.js").symlink_to(tmp_path / "secret.js")
@@ -114,12 +110,11 @@ def test_links_out_of_the_page_are_not_in_the_table(tmp_path: Path):
 
 
 @pytest.mark.parametrize(("kind", "most"), [("mesh", SMALL.mesh_bytes), ("clip", SMALL.clip_bytes)])
-def test_files_that_are_too_large_are_refused_however_they_are_sent(server: Served, kind, most):
+def test_files_that_are_too_large_are_refused_however_they_are_sent(server, kind, most):
     before, ending = list(server.studio.uploads), {"mesh": ".stl", "clip": ".wav"}[kind]
     piece = b"RIFF" * 256
     whole = piece * (most // len(piece) + 1)
-    pieces = [piece] * (len(whole) // len(piece))
-    for body in (whole, iter(pieces), iter([piece] * 1000)):
+    for body in (whole, iter([piece] * (len(whole) // len(piece))), iter([piece] * 1000)):
         try:
             answer = server.ask(f"/{kind}?name=a{ending}", "POST", body)
         except (ConnectionResetError, BrokenPipeError):
@@ -130,12 +125,9 @@ def test_files_that_are_too_large_are_refused_however_they_are_sent(server: Serv
     assert server.ask(f"/{kind}?name=a{ending}", "POST", whole[:most]).status == 200
 
 
-def test_a_length_that_is_only_declared_is_refused_at_once(server: Served):
-    head = f"POST /mesh HTTP/1.1\r\nHost: {server.host}\r\nCookie: {server.cookie}\r\n"
+def test_a_length_that_is_only_declared_is_refused_at_once(server):
     begin = time.monotonic()
-    answer = server.raw(
-        f"{head}Origin: {server.origin}\r\nContent-Length: 99999999999\r\n\r\n".encode()
-    )
+    answer = server.raw(server.posting("mesh", "Content-Length: 99999999999\r\n\r\n"))
     assert answer.split()[1] == b"413" and time.monotonic() - begin < SMALL.idle_seconds
 
 
@@ -149,18 +141,16 @@ def test_a_length_that_is_only_declared_is_refused_at_once(server: Served):
         "Transfer-Encoding: chunked, identity\r\n",
     ],
 )
-def test_lengths_that_can_be_read_in_two_ways_are_refused(server: Served, lengths):
-    head = f"POST /mesh HTTP/1.1\r\nHost: {server.host}\r\nCookie: {server.cookie}\r\n"
-    answer = server.raw(f"{head}Origin: {server.origin}\r\n{lengths}\r\nhello".encode())
+def test_lengths_that_can_be_read_in_two_ways_are_refused(server, lengths):
+    answer = server.raw(server.posting("mesh", f"{lengths}\r\nhello"))
     assert answer.split()[1] in (b"400", b"501")
 
 
 @pytest.mark.parametrize("pause", [0.15, 3.0])
-def test_slow_uploads_are_ended(hasty: Served, pause):
+def test_slow_uploads_are_ended(hasty, pause):
     """One that stops, and one that goes on for ever by a byte at a time."""
-    head = f"POST /clip HTTP/1.1\r\nHost: {hasty.host}\r\nCookie: {hasty.cookie}\r\n"
     with socket.create_connection(("127.0.0.1", hasty.port), timeout=SECONDS) as stream:
-        stream.sendall(f"{head}Origin: {hasty.origin}\r\nContent-Length: 900\r\n\r\nR".encode())
+        stream.sendall(hasty.posting("clip", "Content-Length: 900\r\n\r\nR"))
         ended, drops = threading.Event(), []
 
         def drip() -> None:
@@ -183,28 +173,21 @@ def test_slow_uploads_are_ended(hasty: Served, pause):
     assert sum(drops) < 3 * HASTY.upload_seconds
 
 
-def test_uploads_that_break_off_leave_the_server_well(server: Served):
-    head = f"POST /mesh HTTP/1.1\r\nHost: {server.host}\r\nCookie: {server.cookie}\r\n"
+def test_uploads_that_break_off_leave_the_server_well(server):
     for _ in range(3 * SMALL.uploads):
         with socket.create_connection(("127.0.0.1", server.port), timeout=SECONDS) as stream:
-            stream.sendall(
-                f"{head}Origin: {server.origin}\r\nContent-Length: 900\r\n\r\nR".encode()
-            )
-    until = time.monotonic() + SECONDS
-    while server.upload("mesh", "a.stl", b"solid").status != 200:
-        assert time.monotonic() < until
-        time.sleep(0.05)
+            stream.sendall(server.posting("mesh", "Content-Length: 900\r\n\r\nR"))
+    wait_for(lambda: server.upload("mesh", "a.stl", b"solid").status == 200, "the uploads to end")
 
 
-def test_only_some_files_are_taken_at_a_time(server: Served):
-    head = f"POST /mesh HTTP/1.1\r\nHost: {server.host}\r\nCookie: {server.cookie}\r\n"
+def test_only_some_files_are_taken_at_a_time(server):
     streams = [
         socket.create_connection(("127.0.0.1", server.port), timeout=SECONDS)
         for _ in range(SMALL.uploads)
     ]
     try:
         for stream in streams:
-            stream.sendall(f"{head}Origin: {server.origin}\r\nContent-Length: 9\r\n\r\nR".encode())
+            stream.sendall(server.posting("mesh", "Content-Length: 9\r\n\r\nR"))
         answers = []
 
         def is_refused() -> bool:
@@ -218,7 +201,7 @@ def test_only_some_files_are_taken_at_a_time(server: Served):
             stream.close()
 
 
-def test_headers_have_an_end(server: Served):
+def test_headers_have_an_end(server):
     endless = b"GET / HTTP/1.1\r\nHost: x\r\nA: " + b"a" * 300_000
     try:
         answer = server.raw(endless)
@@ -234,7 +217,7 @@ def test_headers_have_an_end(server: Served):
     ("kind", "content"),
     [("mesh", b"broken"), ("clip", b"no RIFF"), ("mesh", b""), ("clip", b"")],
 )
-def test_contents_that_are_no_good_are_one_sentence(server: Served, kind, content):
+def test_contents_that_are_no_good_are_one_sentence(server, kind, content):
     answer = server.upload(kind, "a.wav", content)
     assert answer.status == 400 and "expected" in answer.error
 
@@ -260,7 +243,7 @@ NAMES = {
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_names_of_files_are_names_and_nothing_else(server: Served, name):
+def test_names_of_files_are_names_and_nothing_else(server, name):
     assert plain_name(name, "clip") == NAMES[name]
     before = list(server.studio.uploads)
     answer = server.upload("clip", name, b"RIFF")
@@ -275,14 +258,14 @@ def test_names_of_files_are_names_and_nothing_else(server: Served, name):
 @pytest.mark.parametrize(
     "name", ["pan.yaml", "pan.h5", "a.py", "page.html", "run.sh", "a.stl.exe", "a", "a.", "a.zip"]
 )
-def test_only_meshes_and_clips_come_to_lie_among_the_persons_files(server: Served, kind, name):
+def test_only_meshes_and_clips_come_to_lie_among_the_persons_files(server, kind, name):
     before = list(server.studio.uploads)
     answer = server.upload(kind, name, b"RIFF")
     assert answer.status == 400 and "ends in" in answer.error
     assert server.studio.uploads == before
 
 
-def test_script_in_names_is_text_wherever_it_comes_back(server: Served):
+def test_script_in_names_is_text_wherever_it_comes_back(server):
     name = "</script><img src=x onerror=alert(1)>"
     assert server.ask("/clip/" + "%3Cscript%3E" + "/sound").status == 404
     with server.talk() as page:
@@ -309,7 +292,7 @@ def next_event_targets(page, server: Served) -> list[str]:
 
 
 @pytest.mark.parametrize("route", [*ROUTES, "/nowhere", "/clip/c9/sound", "/export/exe"])
-def test_browsers_are_told_to_take_nothing_for_what_it_is_not(server: Served, route):
+def test_browsers_are_told_to_take_nothing_for_what_it_is_not(server, route):
     headers = server.ask(route).headers
     assert headers["X-Content-Type-Options"] == "nosniff"
     assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
@@ -327,13 +310,13 @@ def test_browsers_are_told_to_take_nothing_for_what_it_is_not(server: Served, ro
 @pytest.mark.parametrize(
     "method", ["PUT", "DELETE", "PATCH", "TRACE", "CONNECT", "PROPFIND", "get"]
 )
-def test_other_methods_do_nothing(server: Served, method):
+def test_other_methods_do_nothing(server, method):
     for route in (*ROUTES, "/mesh", "/clip", "/socket"):
         own = {"Origin": server.origin}
         assert server.ask(route, method, headers=own).status in (400, 403, 404, 405)
 
 
-def test_what_changes_something_is_asked_for_by_post_alone(server: Served):
+def test_what_changes_something_is_asked_for_by_post_alone(server):
     for route in ("/mesh", "/clip"):
         assert server.ask(route).status == 405
         assert server.ask(route, "HEAD").status == 405
@@ -345,7 +328,7 @@ def test_what_changes_something_is_asked_for_by_post_alone(server: Served):
 
 
 @pytest.mark.parametrize("message", ["x" * 3000, b"x" * 3000])
-def test_messages_that_are_too_long_end_the_connection(server: Served, message):
+def test_messages_that_are_too_long_end_the_connection(server, message):
     with server.talk() as page:
         with pytest.raises(ConnectionClosed) as caught:
             reply_of(page, message)
@@ -405,7 +388,7 @@ WRONG = (
 
 
 @pytest.mark.parametrize("message", [*MALFORMED, *WRONG], ids=lambda each: str(each)[:40])
-def test_messages_that_make_no_sense_are_one_sentence(server: Served, message):
+def test_messages_that_make_no_sense_are_one_sentence(server, message):
     with server.talk() as page:
         reply = reply_of(page, message)
         assert reply["reply"] == (1 if message in WRONG else None)

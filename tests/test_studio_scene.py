@@ -1,9 +1,6 @@
 """The page of a scene that needs no server: what is seen and heard agree, and it is struck."""
 
-from __future__ import annotations
-
 import base64
-import importlib.util
 import io
 import shutil
 from dataclasses import replace
@@ -23,7 +20,7 @@ from studio.scene.content import GROUND_ON_PAGE, LOUDEST_STRIKE, QUIETEST_STRIKE
 from studio.standalone.content import GAIN_ERROR, STEPS
 from tests.chromium import ARGUMENTS, CHECKOUT, PROGRAMS, served
 from tests.strike_latency import TAP_ADDRESS
-from tests.studio_pages import until_page
+from tests.studio_pages import axe_finds, until_page
 from tests.test_studio_standalone import HOSTILE, samples
 
 pytestmark = pytest.mark.nightly(unless=("studio", "sound"))
@@ -203,7 +200,7 @@ def endlessly(page) -> None:
     begin(page)
 
 
-def test_opens_from_a_file_and_asks_for_nothing(shown) -> None:
+def test_opens_from_a_file_and_asks_for_nothing(shown):
     assert shown.evaluate("scene.sound.failure") is None
     assert all(url.startswith(("file:", "blob:", "data:")) for url in shown.asked)
     assert sum(url.startswith("file:") for url in shown.asked) == 1
@@ -220,7 +217,7 @@ def test_opens_from_a_file_and_asks_for_nothing(shown) -> None:
     assert len(np.unique(drawn.reshape(-1, 3), axis=0)) > 500
 
 
-def test_playing_moves_bodies_to_where_they_are_at_the_time(shown) -> None:
+def test_playing_moves_bodies_to_where_they_are_at_the_time(shown):
     places = """() => [scene.playback.at, ...scene.stage.actors.map(({ mesh }) => {
       const [x, y, z, w] = mesh.quaternion.toArray();
       return [...mesh.position.toArray(), w, x, y, z];
@@ -235,7 +232,7 @@ def test_playing_moves_bodies_to_where_they_are_at_the_time(shown) -> None:
     assert shown.locator("#clock").inner_text().endswith("/ 2.50 s")
 
 
-def test_what_is_drawn_is_what_is_heard_within_a_frame(shown) -> None:
+def test_what_is_drawn_is_what_is_heard_within_a_frame(shown):
     endlessly(shown)
     off: list[float] = []
     for _ in range(11):
@@ -245,7 +242,7 @@ def test_what_is_drawn_is_what_is_heard_within_a_frame(shown) -> None:
     assert max(off) < FRAME
 
 
-def test_an_impact_sounds_when_the_scene_says_that_it_does(shown) -> None:
+def test_an_impact_sounds_when_the_scene_says_that_it_does(shown):
     tap(shown)
     begin(shown)
     onset = until_page(shown, "tapped[0]?.onset")
@@ -253,7 +250,7 @@ def test_an_impact_sounds_when_the_scene_says_that_it_does(shown) -> None:
     assert abs(shown.evaluate(f"scene.sound.playedAt({onset})") - bounces(SECONDS)[0][0]) < 1e-3
 
 
-def test_time_passes_evenly_and_follows_the_sound(modules) -> None:
+def test_time_passes_evenly_and_follows_the_sound(modules):
     """The sound's time comes in pieces of 10 ms, a jump is taken at once, and on a machine that has
     no time for sound, whose pieces are of 40 ms, what is seen stays with it.
     """
@@ -280,7 +277,7 @@ def test_time_passes_evenly_and_follows_the_sound(modules) -> None:
     assert max(starved) < FRAME
 
 
-def test_nothing_is_heard_beyond_the_end(modules) -> None:
+def test_nothing_is_heard_beyond_the_end(modules):
     """The last picture is the end's, however far beyond it the sound's time says that it is."""
     last, off, runs = modules.evaluate(
         """async () => {
@@ -302,7 +299,7 @@ def test_nothing_is_heard_beyond_the_end(modules) -> None:
     assert max(off) < FRAME
 
 
-def test_numbers_are_written_as_people_read_them(modules) -> None:
+def test_numbers_are_written_as_people_read_them(modules):
     found = modules.evaluate(
         """async () => {
           const say = await import("/scene/numbers.js");
@@ -322,7 +319,7 @@ def test_numbers_are_written_as_people_read_them(modules) -> None:
     ]
 
 
-def test_is_sought_by_keys_and_timeline(shown) -> None:
+def test_is_sought_by_keys_and_timeline(shown):
     at, rows = "scene.playback.at", "document.querySelectorAll('#impacts tbody tr').length"
     shown.keyboard.press("ArrowRight")
     assert shown.evaluate(at) == pytest.approx(0.5)
@@ -346,7 +343,7 @@ def test_is_sought_by_keys_and_timeline(shown) -> None:
     assert not shown.evaluate("scene.playback.wanted")
 
 
-def test_ends_or_plays_over_and_over(shown) -> None:
+def test_ends_or_plays_over_and_over(shown):
     shown.evaluate(f"scene.playback.seek({SECONDS - 0.2})")
     begin(shown)
     until_page(shown, "!scene.playback.wanted")
@@ -360,7 +357,7 @@ def test_ends_or_plays_over_and_over(shown) -> None:
     assert shown.evaluate("scene.sound.playing") is None
 
 
-def test_is_struck_while_it_plays_and_while_it_does_not(shown) -> None:
+def test_is_struck_while_it_plays_and_while_it_does_not(shown):
     struck = "scene.sound.bank.level().ringing"
     endlessly(shown)
     shown.mouse.click(*middle_of(shown, BLOCK))
@@ -381,7 +378,7 @@ def test_is_struck_while_it_plays_and_while_it_does_not(shown) -> None:
     assert "block: struck with" in shown.inner_text("#told")
 
 
-def test_the_middle_is_struck_by_a_key(shown) -> None:
+def test_the_middle_is_struck_by_a_key(shown):
     endlessly(shown)
     shown.keyboard.press(" ")
     shown.evaluate(
@@ -402,7 +399,7 @@ def test_the_middle_is_struck_by_a_key(shown) -> None:
     until_page(shown, f"((at) => {away} < 1e-6)(scene.stage.camera.position.toArray())")
 
 
-def test_nothing_is_beyond_full_scale(shown) -> None:
+def test_nothing_is_beyond_full_scale(shown):
     tap(shown)
     begin(shown)
     until_page(shown, "scene.playback.at > 0.2")
@@ -414,7 +411,7 @@ def test_nothing_is_beyond_full_scale(shown) -> None:
     assert shown.evaluate("tapped.at(-1).loudest") < 1.0 + 1e-6
 
 
-def test_strikes_are_waves_or_dots_where_motion_is_unwelcome(browser, path) -> None:
+def test_strikes_are_waves_or_dots_where_motion_is_unwelcome(browser, path):
     for motion, dotted in (("no-preference", False), ("reduce", True)):
         page = opened(browser, path, reduced_motion=motion)
         endlessly(page)
@@ -433,7 +430,7 @@ def test_strikes_are_waves_or_dots_where_motion_is_unwelcome(browser, path) -> N
         page.context.close()
 
 
-def test_browsers_that_ask_for_a_click_are_given_one(browser, path) -> None:
+def test_browsers_that_ask_for_a_click_are_given_one(browser, path):
     program = next(filter(None, map(shutil.which, PROGRAMS)))
     asking = [each for each in ARGUMENTS if "autoplay" not in each]
     other = browser.browser_type.launch(executable_path=program, args=asking)
@@ -457,7 +454,7 @@ def test_browsers_that_ask_for_a_click_are_given_one(browser, path) -> None:
     other.close()
 
 
-def test_without_graphics_it_is_heard(browser, path) -> None:
+def test_without_graphics_it_is_heard(browser, path):
     page = browser.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(path.as_uri())
@@ -470,7 +467,7 @@ def test_without_graphics_it_is_heard(browser, path) -> None:
     page.close()
 
 
-def test_names_are_no_markup(browser, tmp_path) -> None:
+def test_names_are_no_markup(browser, tmp_path):
     path = tmp_path / "page.html"
     told = performance(tuple(f"{HOSTILE}{number}" for number in range(3)))
     write_scene_page(path, replace(told, title=HOSTILE))
@@ -489,22 +486,16 @@ def test_names_are_no_markup(browser, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 390), ("dark", 1000)])
-def test_axe_finds_nothing_serious(browser, path, scheme, width) -> None:
-    package = importlib.util.find_spec("axe_playwright_python")
-    if package is None or package.origin is None:
-        pytest.skip("axe-playwright-python is not installed")
-    viewport = {"width": width, "height": 600}
-    page = opened(browser, path, viewport=viewport, color_scheme=scheme)
-    page.evaluate((Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
+def test_axe_finds_nothing_serious(browser, path, scheme, width):
+    page = opened(browser, path, viewport={"width": width, "height": 600}, color_scheme=scheme)
     for deed in ("", "scene.playback.seek(1)", "document.querySelector('summary').click()"):
         page.evaluate(deed)
-        found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
-        assert [each["id"] for each in found if each["impact"] in ("serious", "critical")] == []
+        assert axe_finds(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.context.close()
 
 
-def test_the_sound_is_read_without_loss(browser) -> None:
+def test_the_sound_is_read_without_loss(browser):
     sound = np.random.default_rng(3).uniform(-1.0, 1.0, (RATE // 10, 2))
     file = flac(sound, RATE)
     read, rate = soundfile.read(io.BytesIO(file))
@@ -525,7 +516,7 @@ def test_the_sound_is_read_without_loss(browser) -> None:
     page.close()
 
 
-def test_holds_what_it_says_to_a_stated_error() -> None:
+def test_holds_what_it_says_to_a_stated_error():
     told = performance()
     header, arrays = unpack(content(told))
     assert header["seconds"] == pytest.approx(SECONDS)
@@ -552,7 +543,7 @@ def test_holds_what_it_says_to_a_stated_error() -> None:
         np.testing.assert_allclose(gains, sung.gains, rtol=GAIN_ERROR)
 
 
-def test_a_strike_by_hand_is_as_the_hardest_impact_as_far_as_that_is_well_heard() -> None:
+def test_a_strike_by_hand_is_as_the_hardest_impact_as_far_as_that_is_well_heard():
     told = performance()
     voice = told.voices[BALL]
     assert voice is not None
@@ -569,13 +560,13 @@ def test_a_strike_by_hand_is_as_the_hardest_impact_as_far_as_that_is_well_heard(
         assert header["objects"][BLOCK]["contact_s"] == 0.0
 
 
-def test_is_the_same_twice(path, tmp_path) -> None:
+def test_is_the_same_twice(path, tmp_path):
     again = tmp_path / "again.html"
     write_scene_page(again, performance())
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_a_large_page_is_told(tmp_path, capsys, monkeypatch) -> None:
+def test_a_large_page_is_told(tmp_path, capsys, monkeypatch):
     write_scene_page(tmp_path / "small.html", performance())
     assert capsys.readouterr().err == ""
     monkeypatch.setattr(page, "LARGE_BYTES", 1000)
@@ -584,7 +575,7 @@ def test_a_large_page_is_told(tmp_path, capsys, monkeypatch) -> None:
     assert "large.html" in said and "MB" in said and "7 modes" in said
 
 
-def test_what_does_not_fit_is_told(tmp_path) -> None:
+def test_what_does_not_fit_is_told(tmp_path):
     told = performance()
     with pytest.raises(UserError, match=r"voices \(2,\), expected \(3,\)"):
         write_scene_page(tmp_path / "page.html", replace(told, voices=told.voices[:2]))

@@ -1,7 +1,5 @@
 """What the studio's server answers to its page, and how it begins and ends."""
 
-from __future__ import annotations
-
 import asyncio
 import io
 import json
@@ -12,9 +10,10 @@ import socket
 import stat
 import subprocess
 import sys
-import time
 import wave
 from pathlib import Path
+from types import SimpleNamespace
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -31,10 +30,10 @@ from studio.feed import LONGEST_FEED, Feed
 from studio.interface import CLIP_PARTS, EXPORTS
 from studio.server import browser
 from studio.server.serve import FIRST_PORT, address_of, listen
+from tests.patience import wait_for
+from tests.programs import CHECKOUT, checkout_environment
 from tests.small_design import small_design
-from tests.studio_server import SECONDS, Served, next_event, reply_of, served
-
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.studio_server import SECONDS, next_event, reply_of, served
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +45,7 @@ def server():
 # -------------------------------------------------------------------------- answers
 
 
-def test_the_page_and_all_files_that_it_names_are_there(server: Served):
+def test_the_page_and_all_files_that_it_names_are_there(server):
     page = server.ask("/").content.decode()
     named = re.findall(r'(?:src|href)="(/page/[^"]+)"', page)
     mapped = json.loads(re.findall(r'<script type="importmap">(.*?)</script>', page, re.DOTALL)[0])
@@ -59,14 +58,14 @@ def test_the_page_and_all_files_that_it_names_are_there(server: Served):
         assert answer.headers.get_content_type() == types[address.rpartition(".")[2]]
 
 
-def test_a_file_that_has_not_changed_is_not_sent_again(server: Served):
+def test_a_file_that_has_not_changed_is_not_sent_again(server):
     mark = server.ask("/page/main.js").headers["ETag"]
     again = server.ask("/page/main.js", headers={"If-None-Match": mark})
     assert again.status == 304 and not again.content
     assert server.ask("/page/main.js", headers={"If-None-Match": '"other"'}).status == 200
 
 
-def test_the_surface_is_one_binary_answer(server: Served):
+def test_the_surface_is_one_binary_answer(server):
     header, arrays = unpack(server.ask("/surface/1").content)
     state = server.studio.state()["solid"]
     assert header["event"] == "surface" and header["number"] == 1
@@ -92,7 +91,7 @@ def test_arrays_of_binary_messages_begin_where_views_of_them_may():
         pack({"cost": float("nan")}, {})
 
 
-def test_clips_can_be_heard_and_seen(server: Served):
+def test_clips_can_be_heard_and_seen(server):
     for part in CLIP_PARTS:
         answer = server.ask(f"/clip/c1/{part}")
         assert answer.headers.get_content_type() == "audio/wav"
@@ -106,7 +105,7 @@ def test_clips_can_be_heard_and_seen(server: Served):
 
 
 @pytest.mark.parametrize("kind", EXPORTS)
-def test_designs_are_taken_home_as_files(server: Served, kind):
+def test_designs_are_taken_home_as_files(server, kind):
     answer = server.ask(f"/export/{kind}?target=rim")
     assert answer.status == 200 and answer.content
     told = answer.headers["Content-Disposition"]
@@ -114,11 +113,11 @@ def test_designs_are_taken_home_as_files(server: Served, kind):
     assert server.ask("/export/wav?target=nowhere").status == 400
 
 
-def test_the_schema_of_projects_is_told(server: Served):
+def test_the_schema_of_projects_is_told(server):
     assert server.ask("/schema.json").json == json.loads(json.dumps(schema_of(Project)))
 
 
-def test_what_is_sent_arrives(server: Served):
+def test_what_is_sent_arrives(server):
     content = os.urandom(3 << 20)
     answer = server.upload("mesh", "Müller's pan.stl", content)
     assert answer.status == 200 and answer.json["mesh"].startswith("m")
@@ -128,7 +127,7 @@ def test_what_is_sent_arrives(server: Served):
     assert server.studio.uploads[-1] == ("clip", "a.wav", 5004)
 
 
-def test_a_fault_of_the_studios_own_is_told_as_such(server: Served, monkeypatch, capsys):
+def test_a_fault_of_the_studios_own_is_told_as_such(server, monkeypatch, capsys):
     async def broken(*_: object) -> bytes:
         raise ZeroDivisionError("secret detail")
 
@@ -144,7 +143,7 @@ def test_a_fault_of_the_studios_own_is_told_as_such(server: Served, monkeypatch,
 # -------------------------------------------------------------------------- messages
 
 
-def test_a_page_is_told_the_state_the_history_and_the_bank_first(server: Served):
+def test_a_page_is_told_the_state_the_history_and_the_bank_first(server):
     with server.talk() as page:
         state, history, bank = (page.recv(timeout=SECONDS) for _ in range(3))
     assert json.loads(state)["event"] == "state"
@@ -157,7 +156,7 @@ def test_a_page_is_told_the_state_the_history_and_the_bank_first(server: Served)
     assert arrays["struck"].shape == (len(header["targets"]), n_modes)
 
 
-def test_all_pages_hear_of_a_change_and_the_caller_before_its_reply(server: Served):
+def test_all_pages_hear_of_a_change_and_the_caller_before_its_reply(server):
     with server.talk() as one, server.talk() as other:
         revisions = [next_event(each, "state")["revision"] for each in (one, other)]
         one.send(json.dumps({"id": 5, "do": "add_target", "vertex": 7, "name": "other"}))
@@ -172,14 +171,14 @@ def test_all_pages_hear_of_a_change_and_the_caller_before_its_reply(server: Serv
         assert reply_of(one, {"id": 6, "do": "remove_target", "target": "other"}) == {"reply": 6}
 
 
-def test_calls_reach_the_studio_as_they_are(server: Served):
+def test_calls_reach_the_studio_as_they_are(server):
     with server.talk() as page:
         message = {"id": 1, "do": "change_target", "target": "rim", "without": [440.0]}
         assert reply_of(page, message) == {"reply": 1}
     assert server.studio.calls[-1] == ("change_target", {"target": "rim", "without": [440.0]})
 
 
-def test_what_is_slow_does_not_hold_up_a_stop(server: Served, monkeypatch):
+def test_what_is_slow_does_not_hold_up_a_stop(server, monkeypatch):
     released = asyncio.Event()
 
     async def call(name: str, arguments: object) -> None:
@@ -195,7 +194,7 @@ def test_what_is_slow_does_not_hold_up_a_stop(server: Served, monkeypatch):
         assert reply_of(page, {"id": 3, "do": "stop"})["reply"] in (1, 3)
 
 
-def test_progress_of_a_search_comes_by_itself(server: Served):
+def test_progress_of_a_search_comes_by_itself(server):
     with server.talk() as page:
         assert reply_of(page, {"id": 1, "do": "optimise"}) == {"reply": 1}
         costs = [next_event(page, "progress")["cost"] for _ in range(3)]
@@ -217,7 +216,7 @@ def test_a_slow_page_gets_the_newest_bank_and_no_backlog():
     ]
 
 
-def test_a_page_that_was_away_is_sent_the_newest_bank_and_few_others(server: Served):
+def test_a_page_that_was_away_is_sent_the_newest_bank_and_few_others(server):
     """What is on its way in buffers comes as well; the rest is skipped."""
     changes = 300
     with server.talk(max_queue=1) as page:
@@ -232,7 +231,7 @@ def test_a_page_that_was_away_is_sent_the_newest_bank_and_few_others(server: Ser
     assert numbers == sorted(numbers) and len(numbers) < changes / 2
 
 
-def test_a_page_that_keeps_too_much_waiting_is_cut_off_and_others_are_not(server: Served):
+def test_a_page_that_keeps_too_much_waiting_is_cut_off_and_others_are_not(server):
     feed = Feed()
     for number in range(LONGEST_FEED + 1):
         assert not feed.closed
@@ -252,14 +251,11 @@ def test_a_page_that_keeps_too_much_waiting_is_cut_off_and_others_are_not(server
         assert reply_of(page, {"id": 1, "do": "stop"}) == {"reply": 1}
 
 
-def test_nothing_is_kept_for_pages_that_are_gone(server: Served):
+def test_nothing_is_kept_for_pages_that_are_gone(server):
     for _ in range(5):
         with server.talk() as page:
             next_event(page, "state")
-    until = time.monotonic() + SECONDS
-    while server.studio.feeds and time.monotonic() < until:
-        time.sleep(0.02)
-    assert not server.studio.feeds
+    wait_for(lambda: not server.studio.feeds, "the end of the feeds")
 
 
 def test_numbers_that_json_does_not_have_are_not_sent():
@@ -292,7 +288,7 @@ def test_the_server_ends_in_order_with_a_page_open(ending):
     process = subprocess.Popen(
         [sys.executable, "-m", "tests.studio_stub"],
         cwd=CHECKOUT,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        env=checkout_environment(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -301,7 +297,8 @@ def test_the_server_ends_in_order_with_a_page_open(ending):
         assert process.stdout is not None
         address, _, token = process.stdout.readline().strip().partition("/?token=")
         host = address.removeprefix("http://")
-        cookie = _cookie(host, token)
+        with urlopen(f"{address}/?token={token}", timeout=SECONDS) as answer:
+            cookie = answer.headers["Set-Cookie"].partition(";")[0]
         headers = {"Cookie": cookie, "Origin": address}
         with connect(f"ws://{host}/socket", additional_headers=headers, max_size=None) as page:
             next_event(page, "state")
@@ -320,16 +317,6 @@ def test_the_server_ends_in_order_with_a_page_open(ending):
         for stream in (process.stdout, process.stderr):
             if stream is not None:
                 stream.close()
-
-
-def _cookie(host: str, token: str) -> str:
-    from http.client import HTTPConnection
-
-    connection = HTTPConnection(host, timeout=SECONDS)
-    connection.request("GET", f"/?token={token}")
-    cookie = connection.getresponse().headers["Set-Cookie"]
-    connection.close()
-    return str(cookie).partition(";")[0]
 
 
 # ------------------------------------------------------------------------- the command
@@ -384,21 +371,18 @@ def test_the_browser_is_led_there_without_the_token_on_its_command_line(
     opened, monkeypatch, tmp_path
 ):
     seen = []
-    monkeypatch.setattr(
-        "studio.server.browser.threading.Thread",
-        lambda target, args, daemon: seen.append(Path(args[0].removeprefix("file://"))) or _Now(),
-    )
+
+    def thread(target, args, daemon):
+        seen.append(Path(args[0].removeprefix("file://")))
+        return SimpleNamespace(start=lambda: None)
+
+    monkeypatch.setattr("studio.server.browser.threading.Thread", thread)
     page = browser.open_page("http://127.0.0.1:1/?token=secret", tmp_path)
     assert page == seen[0] and stat.S_IMODE(page.stat().st_mode) == 0o600
     assert "token=secret" in page.read_text() and "secret" not in str(page)
     assert browser.open_page("http://127.0.0.1:1/?token=other", tmp_path) == page
     assert main(["studio", "--workspace", str(tmp_path / "mine")]) == 0
     assert seen[-1].parent == tmp_path / "mine" and not seen[-1].exists()
-
-
-class _Now:
-    def start(self) -> None:
-        pass
 
 
 def test_listening_for_other_machines_is_warned_of(opened, monkeypatch, tmp_path, capsys):

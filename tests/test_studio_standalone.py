@@ -1,13 +1,9 @@
 """The page of a design that needs no server: it opens from a file, and sounds as the design."""
 
-from __future__ import annotations
-
 import base64
-import importlib.util
 import io
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +19,7 @@ from studio.standalone.content import GAIN_ERROR, STEPS, content
 from studio.standalone.modules import PAGE, gathered, joined, shortened
 from studio.standalone.page import HERE, MANY_TRIANGLES
 from tests.small_design import N_MODES, small_design
-from tests.studio_pages import until_page
+from tests.studio_pages import axe_finds, until_page
 
 pytestmark = pytest.mark.nightly(unless=("studio", "sound"))
 
@@ -38,8 +34,7 @@ PACKED = """(samples) => {
 
 def opened(browser, path):
     """The page of a file, without a network, and what it asked for."""
-    context = browser.new_context(viewport={"width": 1000, "height": 700}, offline=True)
-    page = context.new_page()
+    page = browser.new_context(viewport={"width": 1000, "height": 700}, offline=True).new_page()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.on("pageerror", lambda error: pytest.fail(str(error)))
@@ -59,7 +54,7 @@ def decibels(found: np.ndarray, truth: np.ndarray) -> float:
     return 20 * np.log10(float(np.linalg.norm(found - truth)) / float(np.linalg.norm(truth)))
 
 
-def test_opens_from_a_file_and_sounds_as_the_design(browser, tmp_path) -> None:
+def test_opens_from_a_file_and_sounds_as_the_design(browser, tmp_path):
     design, path = small_design(), tmp_path / "page.html"
     write_page(path, design)
     page, asked = opened(browser, path)
@@ -85,7 +80,7 @@ def test_opens_from_a_file_and_sounds_as_the_design(browser, tmp_path) -> None:
     page.context.close()
 
 
-def test_is_struck_by_pointer_and_keys(browser, tmp_path) -> None:
+def test_is_struck_by_pointer_and_keys(browser, tmp_path):
     path = tmp_path / "page.html"
     write_page(path, small_design())
     page, _ = opened(browser, path)
@@ -114,7 +109,7 @@ def test_is_struck_by_pointer_and_keys(browser, tmp_path) -> None:
     page.context.close()
 
 
-def test_names_are_no_markup(browser, tmp_path) -> None:
+def test_names_are_no_markup(browser, tmp_path):
     design, path = small_design(), tmp_path / "page.html"
     strikes = [replace(each, name=f"{HOSTILE}{n}") for n, each in enumerate(design.strikes)]
     settings = {**design.settings, "mesh": HOSTILE}
@@ -129,30 +124,24 @@ def test_names_are_no_markup(browser, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious(browser, tmp_path, scheme) -> None:
-    package = importlib.util.find_spec("axe_playwright_python")
-    if package is None or package.origin is None:
-        pytest.skip("axe-playwright-python is not installed")
+def test_axe_finds_nothing_serious(browser, tmp_path, scheme):
     path = tmp_path / "page.html"
     write_page(path, small_design())
     page, _ = opened(browser, path)
     page.emulate_media(color_scheme=scheme)
     for summary in page.locator("summary").all():
         summary.click()
-    page.evaluate((Path(package.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
-    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
-    assert [each["id"] for each in found if each["impact"] in ("serious", "critical")] == []
+    assert axe_finds(page) == []
     page.context.close()
 
 
-def test_holds_what_it_says_to_a_stated_error() -> None:
+def test_holds_what_it_says_to_a_stated_error():
     design = small_design()
     header, arrays = unpack(content(design))
     solid = SoundingSolid.of_design(design)
     listening = Listening.of_design(design, solid)
     low, high = arrays["halves"].view("u1").reshape(2, -1)
-    halves = np.column_stack([low, high]).ravel().view("<f2")
-    shares = halves.astype(float).reshape(N_MODES, -1).T
+    shares = np.column_stack([low, high]).ravel().view("<f2").astype(float).reshape(N_MODES, -1).T
     gains = shares * arrays["loudest"]
     for strike in design.strikes:
         amplitudes = solid.amplitudes(strike.position[None], strike.inward[None])[0]
@@ -169,7 +158,7 @@ def test_holds_what_it_says_to_a_stated_error() -> None:
     np.testing.assert_array_equal(arrays["triangles"], design.surface_faces)
 
 
-def test_many_triangles_are_told(tmp_path, capsys) -> None:
+def test_many_triangles_are_told(tmp_path, capsys):
     import trimesh
 
     design = small_design()
@@ -188,12 +177,12 @@ def test_many_triangles_are_told(tmp_path, capsys) -> None:
     assert f"{len(surface.faces):,} triangles" in said and "MB" in said
 
 
-def test_what_cannot_be_written_is_told(tmp_path) -> None:
+def test_what_cannot_be_written_is_told(tmp_path):
     with pytest.raises(UserError, match="nowhere"):
         write_page(tmp_path / "nowhere" / "page.html", small_design())
 
 
-def test_modules_name_each_other_by_numbers() -> None:
+def test_modules_name_each_other_by_numbers():
     modules = gathered(HERE / "main.js")
     named = re.compile(r"""\b(?:from|import)\s*\(?\s*["']([\w./@-]+)["']""")
     for source in modules.values():
@@ -201,7 +190,7 @@ def test_modules_name_each_other_by_numbers() -> None:
     assert "export async function start" in list(modules.values())[-1]
 
 
-def test_a_worklet_is_one_module() -> None:
+def test_a_worklet_is_one_module():
     source = joined(PAGE / "sound/bank-processor.js")
     assert not re.search(r"^(?:import|export)\b", source, re.M)
     # Those of its own level: classes, functions, and constants in capitals.
@@ -209,7 +198,7 @@ def test_a_worklet_is_one_module() -> None:
     assert {"Bank", "Limiter", "BankProcessor"} <= set(names) and len(names) == len(set(names))
 
 
-def test_licences_stay() -> None:
+def test_licences_stay():
     source = (PAGE / "vendor/three/three.core.js").read_text()
     assert "@license" in shortened(source)
     assert len(shortened(source)) < 0.6 * len(source)

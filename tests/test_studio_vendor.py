@@ -1,7 +1,5 @@
 """The libraries of the studio's page are those that are listed, whole and with their licences."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Processes that compute for the studio: what they answer, and how they end."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import resource
@@ -72,122 +70,90 @@ def worker():
     made.end()
 
 
-def test_a_process_listens_on_no_network(worker):
-    assert asyncio.run(worker.call("listening")) == (True, [])
+async def test_a_process_listens_on_no_network(worker):
+    assert await worker.call("listening") == (True, [])
 
 
-def test_calls_are_answered_in_order_by_one_object(worker):
-    async def call():
-        return await asyncio.gather(*(worker.call("add", number) for number in (1, 2, 3)))
-
-    assert asyncio.run(call()) == [1, 3, 6]
+async def test_calls_are_answered_in_order_by_one_object(worker):
+    assert await asyncio.gather(*(worker.call("add", number) for number in (1, 2, 3))) == [1, 3, 6]
 
 
-def test_a_worker_spares_the_memory_of_its_machine(worker):
-    limit, score = asyncio.run(worker.call("limits"))
+async def test_a_worker_spares_the_memory_of_its_machine(worker):
+    limit, score = await worker.call("limits")
     assert limit > 2 * memory_bytes()  # infinite is -1
     assert int(score) >= FIRST_TO_GO
 
 
-def test_news_come_before_the_answer(worker):
+async def test_news_come_before_the_answer(worker):
     news = []
-
-    async def call():
-        return await worker.call("tell_on", 5, tell=news.append)
-
-    assert asyncio.run(call()) == "told"
+    assert await worker.call("tell_on", 5, tell=news.append) == "told"
     assert news == [0, 1, 2, 3, 4]
 
 
-def test_errors_are_the_same_sentences(worker):
-    async def call():
-        with pytest.raises(UserError) as caught:
-            await worker.call("fail", "no file a", "no file b")
-        assert caught.value.args == ("no file a", "no file b")
-        with pytest.raises(UserError, match="fault of the program .KeyError") as caught:
-            await worker.call("go_wrong")
-        assert "\n" not in str(caught.value)
-        return await worker.call("add", 1)
-
-    assert asyncio.run(call()) == 1
+async def test_errors_are_the_same_sentences(worker):
+    with pytest.raises(UserError) as caught:
+        await worker.call("fail", "no file a", "no file b")
+    assert caught.value.args == ("no file a", "no file b")
+    with pytest.raises(UserError, match="fault of the program .KeyError") as caught:
+        await worker.call("go_wrong")
+    assert "\n" not in str(caught.value)
+    assert await worker.call("add", 1) == 1
 
 
-def test_what_takes_too_long_is_ended_and_the_next_call_answered(worker):
-    async def call():
-        with pytest.raises(UserError, match="longer than 0.1 s"):
-            await worker.call("work", seconds=0.1)
-        return await worker.call("add", 1)
-
-    assert asyncio.run(call()) == 1
+async def test_what_takes_too_long_is_ended_and_the_next_call_answered(worker):
+    with pytest.raises(UserError, match="longer than 0.1 s"):
+        await worker.call("work", seconds=0.1)
+    assert await worker.call("add", 1) == 1
 
 
-def test_a_process_that_does_not_get_to_work_is_waited_for(worker):
-    async def call():
-        pid = await worker.call("pid")
-        os.kill(pid, signal.SIGSTOP)
-        asking = asyncio.ensure_future(worker.call("add", 1, seconds=0.1))
-        await asyncio.sleep(1.0)
-        assert not asking.done()
-        os.kill(pid, signal.SIGCONT)
-        return await asking
-
-    assert asyncio.run(call()) == 1
+async def test_a_process_that_does_not_get_to_work_is_waited_for(worker):
+    pid = await worker.call("pid")
+    os.kill(pid, signal.SIGSTOP)
+    asking = asyncio.ensure_future(worker.call("add", 1, seconds=0.1))
+    await asyncio.sleep(1.0)
+    assert not asking.done()
+    os.kill(pid, signal.SIGCONT)
+    assert await asking == 1
 
 
-def test_who_is_told_to_end_does_so_even_as_the_answer_comes(worker):
-    async def play():
-        asking = asyncio.ensure_future(worker.call("add", 1, seconds=HANG_SECONDS))
-        await asyncio.sleep(0)
-        ((future, _),) = worker._waiting.values()
-        future.set_result(2)
-        asking.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await asking
-
-    asyncio.run(play())
+async def test_who_is_told_to_end_does_so_even_as_the_answer_comes(worker):
+    asking = asyncio.ensure_future(worker.call("add", 1, seconds=HANG_SECONDS))
+    await asyncio.sleep(0)
+    ((future, _),) = worker._waiting.values()
+    future.set_result(2)
+    asking.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await asking
 
 
-def test_a_process_that_is_killed_fails_what_waits_and_nothing_else(worker):
-    async def call():
-        waiting = asyncio.ensure_future(worker.call("sleep", HANG_SECONDS))
-        await asyncio.sleep(0)
-        os.kill(worker.pid, signal.SIGKILL)
-        with pytest.raises(UserError, match="has ended"):
-            await waiting
-        return await worker.call("add", 2)
-
-    assert asyncio.run(call()) == 2
+async def test_a_process_that_is_killed_fails_what_waits_and_nothing_else(worker):
+    waiting = asyncio.ensure_future(worker.call("sleep", HANG_SECONDS))
+    await asyncio.sleep(0)
+    os.kill(worker.pid, signal.SIGKILL)
+    with pytest.raises(UserError, match="has ended"):
+        await waiting
+    assert await worker.call("add", 2) == 2
 
 
-def test_what_a_process_is_asked_that_has_just_ended_fails_likewise(worker):
-    async def call():
+async def test_what_a_process_is_asked_that_has_just_ended_fails_likewise(worker):
+    await worker.call("add", 1)
+    process = psutil.Process(worker.pid)
+    process.kill()
+    wait_for(lambda: process.status() == psutil.STATUS_ZOMBIE, "a process to end")
+    with pytest.raises(UserError, match="has ended"):
         await worker.call("add", 1)
-        process = psutil.Process(worker.pid)
-        process.kill()
-        wait_for(lambda: process.status() == psutil.STATUS_ZOMBIE, "a process to end")
-        with pytest.raises(UserError, match="has ended"):
-            await worker.call("add", 1)
-        return await worker.call("add", 2)
-
-    assert asyncio.run(call()) == 2
+    assert await worker.call("add", 2) == 2
 
 
-def test_a_process_that_is_ended_leaves_nothing_on_the_disk(worker):
-    async def call():
-        is_initialised, directory = await worker.call("directory")
-        assert is_initialised and f".{worker.pid}." in directory
-        Path(directory).mkdir(exist_ok=True)  # whichever MPI it is
-        worker.end()
-        assert not Path(directory).exists()
-
-    asyncio.run(call())
+async def test_a_process_that_is_ended_leaves_nothing_on_the_disk(worker):
+    is_initialised, directory = await worker.call("directory")
+    assert is_initialised and f".{worker.pid}." in directory
+    Path(directory).mkdir(exist_ok=True)  # whichever MPI it is
+    worker.end()
+    assert not Path(directory).exists()
 
 
-def test_ctrl_c_is_for_the_server(worker):
-    async def call():
-        pid = await worker.call("pid")
-        os.kill(pid, signal.SIGINT)
-        return pid, await worker.call("pid")
-
-    first, second = asyncio.run(call())
-    assert first == second
+async def test_ctrl_c_is_for_the_server(worker):
+    pid = await worker.call("pid")
+    os.kill(pid, signal.SIGINT)
+    assert await worker.call("pid") == pid

@@ -1,7 +1,5 @@
 """Work on trees and in narrow blocks that threads share."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,16 +1,12 @@
 """What of the nightly tests is due: each in its turn, and what is near to a change besides."""
 
-from __future__ import annotations
-
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from tests import tiers
+from tests.programs import CHECKOUT, run
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 SECONDS = {f"test_{name}.py": 10.0 * place for place, name in enumerate("abcdefgh", start=1)}
 PYTEST_SECONDS = """
 12.50s call     tests/test_a.py::test_one[x]
@@ -99,7 +95,7 @@ def test_changes_are_told_from_the_main_branch_or_the_last_commit(tmp_path, monk
 
     def git(*words):
         person = ["-c", "user.name=A", "-c", "user.email=a@example.org"]
-        subprocess.run(["git", *person, "-C", tmp_path, *words], check=True, capture_output=True)
+        run("git", *person, "-C", tmp_path, *words, check=True)
 
     git("init", "-b", "main")
     for name in ("one", "two", "three", "four"):
@@ -125,9 +121,7 @@ def test_durations_are_summed_by_file():
 @pytest.mark.parametrize("tier", ["change", "all"])
 def test_the_tier_decides_which_tests_are_run(tier):
     command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "--tier", tier]
-    done = subprocess.run(
-        [*command, "tests/test_kills.py"], cwd=CHECKOUT, capture_output=True, text=True
-    )
+    done = run(*command, "tests/test_kills.py", cwd=CHECKOUT)
     assert ("test_there_are_fifty_kills" in done.stdout) == (tier == "all"), done.stdout
 
 

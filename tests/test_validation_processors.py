@@ -1,7 +1,5 @@
 """The validation of every solid of the default run passes with kernels for any x86 processor."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Ranks that share cores sleep while they wait, others do not, and messages arrive as before."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The paper's own variants: what their preset asks for, and that poor results make whole pages."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import pytest

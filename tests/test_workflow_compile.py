@@ -1,7 +1,5 @@
 """Kernels are compiled once, whatever asks for them."""
 
-from __future__ import annotations
-
 import pytest
 
 from workflow.__main__ import main

@@ -1,13 +1,8 @@
 """Configuration: keys, defaults, and what is said about mistakes."""
 
-from __future__ import annotations
-
 import copy
 import re
-import subprocess
-import sys
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 import yaml
@@ -25,10 +20,10 @@ from studies.base import catalogue
 from studies.benchmark.options import BenchmarkOptions
 from studies.scaling.runs import ScalingOptions
 from tests.configuration_keys import every_key, every_value
+from tests.programs import CHECKOUT, python
 from workflow import settings, solids
 from workflow.configuration.whole import completed, limits
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 CONFIGS = CHECKOUT / "workflow" / "config"
 
 
@@ -226,9 +221,7 @@ def test_planning_loads_no_library_that_computes():
         f"settings.complete([{str(CONFIGS / 'tiny.yaml')!r}]); catalogue.all_studies()\n"
         "print({'petsc4py', 'numba', 'trimesh', 'mpi4py.MPI', 'matplotlib'} & set(sys.modules))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], check=True, capture_output=True, text=True
-    )
+    done = python("-c", program, check=True)
     assert done.stdout == "set()\n"
 
 

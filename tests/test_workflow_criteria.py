@@ -1,7 +1,5 @@
 """Every criterion of a validation refuses a spectrum that is damaged in just its way."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Digests of result files: equal for equal results, and of nothing else than results."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

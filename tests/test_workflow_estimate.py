@@ -1,7 +1,5 @@
 """The estimate: it adds up, scales with what is asked for, and says how it was reckoned."""
 
-from __future__ import annotations
-
 import copy
 import json
 from functools import cache
@@ -67,8 +65,7 @@ def test_totals_add_up(configs, totals, targets):
             each for each in result["stages"] if each["target"] in ("all", "figures")[:targets]
         ]
         for name in SUMMED:
-            total = sum(stage[name] for stage in counted)
-            assert result[totals][name] == pytest.approx(total)
+            assert result[totals][name] == pytest.approx(sum(stage[name] for stage in counted))
         assert result[totals]["memory_gb"] == max(stage["memory_gb"] for stage in counted)
 
 
@@ -127,8 +124,7 @@ def test_what_is_far_beyond_the_measurements_is_said(configs):
 
 
 def test_jobs_are_those_of_the_rules(configs, plan):
-    file = CONFIGURATIONS / "tiny.yaml"
-    jobs = plan("all", "figures", "--configfile", file)
+    jobs = plan("all", "figures", "--configfile", CONFIGURATIONS / "tiny.yaml")
     rules = _planned(json.dumps(configs["tiny"]), 2, 2)["kind"].str.split(" ").str[0]
     counts = rules.value_counts().to_dict()
     assert counts | {"all": 1, "figures": 1} == {n: jobs[n] for n in jobs if n != "total"}

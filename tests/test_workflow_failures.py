@@ -1,7 +1,5 @@
 """Full, damaged and slow file systems, and jobs that are killed while they write a result."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

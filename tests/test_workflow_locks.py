@@ -1,7 +1,5 @@
 """A killed run does not stop the next one; a running one does."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -10,6 +8,7 @@ import sys
 import pytest
 
 from tests.patience import wait_for
+from tests.programs import checkout_environment
 from tests.workflow_runs import CHECKOUT, snakemake
 from workflow import locks
 
@@ -31,7 +30,7 @@ def holder(folder):
     process = subprocess.Popen(
         [sys.executable, "-c", TAKE],
         cwd=folder.parent,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        env=checkout_environment(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -89,7 +88,7 @@ def test_a_run_goes_on_after_the_one_before_was_killed(tmp_path):
     run = subprocess.Popen(
         [str(part) for part in command],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        env=checkout_environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,

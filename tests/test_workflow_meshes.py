@@ -1,7 +1,5 @@
 """Meshes that kept tables rest on are known by their hash."""
 
-from __future__ import annotations
-
 import hashlib
 
 import pytest

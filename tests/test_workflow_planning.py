@@ -1,11 +1,8 @@
 """Planning a run: quick, and without MPI, whose traces in the environment would reach every job."""
 
-from __future__ import annotations
-
 import re
-import subprocess
-import sys
 
+from tests.programs import python
 from tests.workflow_runs import CHECKOUT
 
 _IMPORT = re.compile(r"(?m)^(?:from (?:carillon|workflow)|import (?:carillon|workflow))\b.*$")
@@ -15,10 +12,5 @@ def test_rules_import_neither_mpi_nor_petsc():
     files = [CHECKOUT / "Snakefile", *(CHECKOUT / "workflow" / "rules").glob("*.smk")]
     imports = [line for file in files for line in _IMPORT.findall(file.read_text())]
     check = "import sys; print(sorted({'mpi4py.MPI', 'petsc4py', 'slepc4py'} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", "\n".join([*imports, check])],
-        cwd=CHECKOUT,
-        capture_output=True,
-        text=True,
-    )
+    done = python("-c", "\n".join([*imports, check]), cwd=CHECKOUT)
     assert done.stdout.strip() == "[]", done.stdout + done.stderr

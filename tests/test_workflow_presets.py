@@ -1,7 +1,5 @@
 """Presets: they fit the schema, are planned without any mesh, and hold the counts they promise."""
 
-from __future__ import annotations
-
 import pytest
 import schema_keys
 
@@ -27,8 +25,7 @@ def test_presets_need_no_file(name):
 @pytest.mark.parametrize("name", ["cluster", "paper"])
 def test_presets_are_planned_on_a_fresh_clone(name, plan):
     config = preset(name)
-    file = CONFIGURATIONS / f"{name}.yaml"
-    jobs = plan("all", "figures", "--configfile", file)
+    jobs = plan("all", "figures", "--configfile", CONFIGURATIONS / f"{name}.yaml")
     shards = config["dataset"]["shards"] * len(config["dataset"]["distributions"])
     assert jobs["generate_shard"] == shards
     assert jobs["find_modes"] == 7 * len(config["models"])
@@ -73,7 +70,6 @@ def test_the_page_has_every_key():
 
 def test_the_page_tells_type_default_unit_and_meaning():
     text = schema_keys.of_configuration()
-    shards = "`dataset.shards` integer, at least 1, at most 10,000; default `2`\n: "
-    assert shards in text
+    assert "`dataset.shards` integer, at least 1, at most 10,000; default `2`\n: " in text
     density = text[text.index("`models.NAME.density` ") :].split("\n\n")[0]
     assert " [kg/m^3]; default `1000.0`\n: Mass density." in density

@@ -1,7 +1,5 @@
 """Tables, numbers and aligned modes of the report."""
 
-from __future__ import annotations
-
 import csv
 import doctest
 from types import SimpleNamespace
@@ -150,8 +148,7 @@ def timed(slepc: float, cold: float, error: float) -> dict:
 
 def headlines(methods: dict, summary: list[dict]) -> dict[str, Table]:
     """The tables that the costs of a design are told from."""
-    titles = dict(zip(methods, methods))
-    results = SimpleNamespace(methods=methods, titles=titles, config={})
+    results = SimpleNamespace(methods=methods, titles=dict(zip(methods, methods)), config={})
     forests = {"method": "calibrated, forests", "training_seconds": 8.0}
     return {
         "design": design(results),

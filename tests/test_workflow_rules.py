@@ -1,13 +1,8 @@
 """The rules: they lint, and the default run is planned as promised."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
-
 import pytest
 
-from tests.patience import HANG_SECONDS
+from tests.programs import python
 from tests.workflow_runs import CHECKOUT, PROFILE
 
 
@@ -27,9 +22,7 @@ def test_default_profile_is_read(dry_run, tmp_path):
 
 def test_rules_lint():
     lint = CHECKOUT / ".ci" / "lint_rules.py"
-    done = subprocess.run(
-        [sys.executable, lint], cwd=CHECKOUT, capture_output=True, text=True, timeout=HANG_SECONDS
-    )
+    done = python(lint, cwd=CHECKOUT)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

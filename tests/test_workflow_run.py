@@ -1,7 +1,5 @@
 """The smallest run from end to end: it finishes, is not repeated, and its page is what it says."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -91,8 +89,7 @@ def test_nothing_unfinished_is_left(results):
 
 
 def test_names_are_neither_run_nor_taken_for_markup(finished, results):
-    made = {path.name for path in finished.iterdir()}
-    assert made == {".snakemake", "names.yaml", NAME}
+    assert {path.name for path in finished.iterdir()} == {".snakemake", "names.yaml", NAME}
     pages = list(results.rglob("*.html"))
     assert len(pages) >= 1 + len(MODELS)
     for path in pages:

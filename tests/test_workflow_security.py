@@ -1,7 +1,5 @@
 """What people write into configurations and names reaches no shell and fills no memory."""
 
-from __future__ import annotations
-
 import copy
 import json
 import runpy
@@ -66,8 +64,7 @@ def refusal(config: dict[str, Any]) -> str:
 def test_hostile_names_are_single_words_for_a_shell(name):
     for place in ("models.bell.mesh", "models.bell.material", "results_dir", "mesh_folder"):
         completed(changed(place, name))
-    config = changed("models.bell.mesh", name)
-    assert settings.mesh_of(config, "bell") == f"meshes/{name}"
+    assert settings.mesh_of(changed("models.bell.mesh", name), "bell") == f"meshes/{name}"
     assert shlex.split(quoted(shlex.join(["mpiexec", name]))) == ["mpiexec", name]
 
 
@@ -162,8 +159,7 @@ def test_names_that_nothing_can_be_called_are_refused(name, says):
 @pytest.mark.parametrize("name", ["bar\n", "Bar", "a b", "-a", "a;b", "{a}", "a" * 65, "", 7, None])
 def test_models_have_plain_names(name):
     for part in ("models", "figures.models"):
-        config = changed(part, {name: MODEL})
-        assert refusal(config).startswith(f"{part}: ")
+        assert refusal(changed(part, {name: MODEL})).startswith(f"{part}: ")
 
 
 @pytest.mark.parametrize("text", ["a\nb", "\x00", "\x1b[31m", "x" * 201, "\udfff"])
@@ -366,6 +362,7 @@ def test_jobs_of_a_cluster_are_given_plain_values(value):
 # Folders of results ------------------------------------------------------------------------------
 
 TABLE = {"name": "t", "caption": "", "columns": [{"key": "a", "label": "A"}], "rows": [{"a": 1}]}
+SECONDS = {"key": "a", "label": "A", "kind": "seconds"}
 
 
 @pytest.mark.parametrize(
@@ -379,11 +376,8 @@ TABLE = {"name": "t", "caption": "", "columns": [{"key": "a", "label": "A"}], "r
                 {"columns": [1]},
                 {"columns": [{"key": "a"}]},
                 {"columns": [{"key": "a", "label": "A", "kind": "magic"}]},
-                {"columns": [{"key": "a", "label": "A", "kind": "seconds"}], "rows": [{"a": []}]},
-                {
-                    "columns": [{"key": "a", "label": "A", "kind": "seconds"}],
-                    "rows": [{"a": 1e999}],
-                },
+                {"columns": [SECONDS], "rows": [{"a": []}]},
+                {"columns": [SECONDS], "rows": [{"a": 1e999}]},
                 {"rows": 1},
                 {"rows": [1]},
                 {"keys": ["b"]},

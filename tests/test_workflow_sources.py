@@ -1,7 +1,5 @@
 """What is made anew after a change: what depends on it, and nothing else."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -15,16 +13,7 @@ from tests.patience import HANG_SECONDS
 from tests.workflow_runs import CHECKOUT, planned
 from workflow import source_files, sources
 
-PACKAGES = (
-    "carillon",
-    "dataset_gen",
-    "forests",
-    "solver",
-    "sound",
-    "studio",
-    "workflow",
-    "studies",
-)
+PACKAGES = "carillon dataset_gen forests solver sound studio workflow studies".split()
 CONFIG = """\
 results_dir: results
 models: {{bar: {{mesh: 'builtin:bar', resolution: 8}}}}
@@ -56,30 +45,24 @@ def fingerprint(*modules):
     return sources.fingerprint(*modules)
 
 
-def test_a_module_counts_with_all_that_it_imports(project):
+@pytest.mark.parametrize(
+    ("file", "text", "counts"),
+    [
+        pytest.param("second.py", "VALUE = open('data.json', 'rb')\n", True, id="imported"),
+        pytest.param("third.py", "import room.second\n", False, id="not imported"),
+        pytest.param("data.json", "2", True, id="data that is named"),
+        pytest.param(
+            "first.py",
+            '"""Text."""\n# Text.\nfrom room.second import VALUE  # text\n',
+            False,
+            id="comments and docstrings",
+        ),
+    ],
+)
+def test_a_module_counts_with_all_that_it_imports_and_names(project, file, text, counts):
     before = fingerprint("room.first")
-    (project / "second.py").write_text("VALUE = open('data.json', 'rb')\n")
-    assert fingerprint("room.first") != before
-
-
-def test_a_module_that_is_not_imported_does_not_count(project):
-    before = fingerprint("room.first")
-    (project / "third.py").write_text("import room.second\n")
-    assert fingerprint("room.first") == before
-
-
-def test_data_that_a_module_names_counts(project):
-    before = fingerprint("room.first")
-    (project / "data.json").write_text("2")
-    assert fingerprint("room.first") != before
-
-
-def test_comments_docstrings_and_help_do_not_count(project):
-    before = fingerprint("room.first")
-    (project / "first.py").write_text(
-        '"""Text."""\n# Text.\nfrom room.second import VALUE  # text\n'
-    )
-    assert fingerprint("room.first") == before
+    (project / file).write_text(text)
+    assert (fingerprint("room.first") != before) == counts
 
 
 def again(project):

@@ -1,7 +1,5 @@
 """Benchmark tables: their conditions in every form, and CSV files that programs can read."""
 
-from __future__ import annotations
-
 import csv
 import json
 from types import SimpleNamespace
@@ -151,8 +149,7 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     modelled = {"ranks": 4, "n_dofs": 900, "subdomains": 4, "total": 0.6}
     beside = {**modelled, "ranks": 2, "total": 0.8}
     model = {"rows": [beside, modelled], "fit": "The model differs by up to 20%."}
-    part = {"runs": [run], "model": model}
-    bell = {"strong": part, "weak": None, "provenance": {}}
+    bell = {"strong": {"runs": [run], "model": model}, "weak": None, "provenance": {}}
     results = SimpleNamespace(scaling={"bell": bell}, titles={"bell": "A bell"}, config=CONFIG)
     table = REPORT.entries["scaling"](results)
     measured_row, modelled_row = table.rows

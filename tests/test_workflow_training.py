@@ -1,7 +1,5 @@
 """Training data of the workflow's forests: how samples are divided, and mistakes in that."""
 
-from __future__ import annotations
-
 import pytest
 import yaml
 

@@ -1,7 +1,5 @@
 """Frequencies by theories that share nothing with the references of the product (test support)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -109,5 +107,4 @@ def rod_frequencies(
 
     stiffness = young * moment * summed(bent) + shear * summed(sheared)
     mass = density * (area * summed(deflection) + moment * summed(rotation))
-    squares = eigh(stiffness, mass, eigvals_only=True)
-    return np.sqrt(squares[2:]) / (2.0 * np.pi)
+    return np.sqrt(eigh(stiffness, mass, eigvals_only=True)[2:]) / (2.0 * np.pi)

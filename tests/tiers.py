@@ -4,8 +4,6 @@
 `python -m tests.tiers --measured LOG` writes anew how long it takes.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import json
@@ -16,7 +14,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT, run
+
 TIERS = ("change", "part", "all")
 """What every change needs; that and a part of the rest; everything."""
 TURNS = 3
@@ -179,7 +178,7 @@ def _git(*arguments: str) -> list[str]:
     """Lines that git prints; none if it fails or is not there."""
     try:
         command = ["git", "-C", str(CHECKOUT), *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        done = run(*command, check=True)
     except (OSError, subprocess.CalledProcessError):
         return []
     return done.stdout.splitlines()

@@ -1,15 +1,12 @@
 """Snakemake on the rules of the checkout (test support)."""
 
-from __future__ import annotations
-
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 from tests.patience import HANG_SECONDS
+from tests.programs import CHECKOUT, checkout_environment
 
-CHECKOUT = Path(__file__).resolve().parent.parent
 TINY = CHECKOUT / "workflow" / "config" / "tiny.yaml"
 LAPTOP = CHECKOUT / "workflow" / "config" / "laptop.yaml"
 PROFILE = CHECKOUT / "workflow" / "profiles" / "default"
@@ -20,7 +17,7 @@ def snakemake(
 ) -> subprocess.CompletedProcess[str]:
     """Run Snakemake on the Snakefile of the checkout, with `folder` as working directory."""
     command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    environment = checkout_environment()
     return subprocess.run(
         [str(part) for part in command],
         cwd=folder,

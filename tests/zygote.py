@@ -6,8 +6,6 @@ for every job that it reads as a line of JSON; the fork is bounded in time, memo
 files, has a session of its own, and ends with everything that it has started.
 """
 
-from __future__ import annotations
-
 import atexit
 import ctypes
 import gc
@@ -28,7 +26,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
-CHECKOUT = Path(__file__).resolve().parent.parent
+from tests.programs import CHECKOUT
+
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow")
 WITHOUT_MPI = ("dataset_gen", "forests", "tests.hostile.configure", "snakemake")
 """Programs that import no MPI unless they are started on several ranks."""
@@ -299,8 +298,7 @@ class _Printed:
         """All of it, shortened if it is megabytes."""
         self.read()
         os.close(self._handle)
-        whole = b"".join(self._pieces)
-        return whole[: 1 << 20].decode(errors="replace")
+        return b"".join(self._pieces)[: 1 << 20].decode(errors="replace")
 
 
 def _ended(child: int, mark: str, printed: list[_Printed]) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """`python -m tests.hostile [ROOM...] [-k WORDS]`: hostile inputs, tried and counted."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """Rows of `carillon`, but for the commands that it shares with other programs."""
 
-from __future__ import annotations
-
 from tests.hostile.cases import Table
 
 TABLE = Table("carillon")

@@ -1,13 +1,15 @@
 """Rows of the table: a command line, the files it meets, and how it has to end."""
 
-from __future__ import annotations
-
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 ZOO = "ZOO/"
 """Stands in command lines for the folder of prepared files, see `tests.hostile.zoo`."""
+
+LONG = "x" * 300
+"""What the word LONG in values stands for: a name that no file system takes."""
 
 Arguments = str | Sequence[str]
 
@@ -85,16 +87,22 @@ class Table:
         self._add(row, more)
 
     def each(
-        self, name: str, arguments: Arguments, values: Iterable[str], *says: str, **more: object
+        self, name: str, arguments: Arguments, values: Arguments, *says: str, **more: object
     ) -> None:
         """Add a row for each of the values, which take the place of the word VALUE.
 
-        Every fifth one is tried with every change, and all that have once got through.
+        Every fifth one is tried with every change, and all that have once got through. Values of
+        one text are split as in a shell, braces too; see `WORDS`.
         """
-        for number, value in enumerate(values):
+        for number, value in enumerate(_expanded(values) if isinstance(values, str) else values):
             words = [word.replace("VALUE", value) for word in _split(arguments)]
             usual = number % 5 == 0 or any(word in value for word in GOT_THROUGH)
             self.hostile(f"{name} {_shown(value)}", words, *says, usual=usual, **more)
+
+    def places(self, name: str, arguments: Arguments, file: str, *says: str) -> None:
+        """Add a row for each kind of place that stands where the file is expected."""
+        for kind in ("folder", "null", "full", "pipe", "socket"):
+            self.hostile(f"{name} {kind}", arguments, *says, files={file: Place(kind)})
 
     def _add(self, row: Case, more: Mapping[str, object]) -> None:
         command = row.arguments[0] if len(row.arguments) > 1 else self.room
@@ -103,8 +111,35 @@ class Table:
         self.rows.append(row)
 
 
+CLOSED: dict[str, Any] = {"files": {"closed": Place("folder", rights=0o555)}, "plain": True}
+"""A folder `closed` that nothing may be written to."""
+
+
+def unreadable(name: str, original: str) -> dict[str, Any]:
+    """A copy of a file of the zoo that may not be read."""
+    return {"files": {name: Copy(original, rights=0)}, "plain": True}
+
+
 def _split(arguments: Arguments) -> tuple[str, ...]:
     return tuple(shlex.split(arguments) if isinstance(arguments, str) else arguments)
+
+
+def _expanded(values: str) -> Iterator[str]:
+    """Words of a text.
+
+    >>> list(_expanded("a-{b,c}.h5 '' 2**64 LONG.h5"))[:4]
+    ['a-b.h5', 'a-c.h5', '', '18446744073709551616']
+    """
+    for word in shlex.split(values):
+        head, _, rest = word.partition("{")
+        inside, _, tail = rest.partition("}")
+        if word in WORDS:
+            yield from WORDS[word]
+        elif "**" in word:
+            base, exponent = word.split("**")
+            yield str(int(base) ** int(exponent))
+        else:
+            yield from (f"{head}{each}{tail}".replace("LONG", LONG) for each in inside.split(","))
 
 
 def _shown(value: str) -> str:
@@ -123,3 +158,5 @@ NO_WHOLE_NUMBERS = ("", "nan", "inf", "1.5", "1e3", "1_000", "0x10", "１２", "
 """Texts that stand for no whole number, or for one beyond 64 bits."""
 NO_NUMBERS = ("", "nan", "inf", "-inf", "0x10", "1e999", "1,5", "一")
 """Texts that stand for no finite number."""
+WORDS = {"NO_WHOLE_NUMBERS": NO_WHOLE_NUMBERS, "NO_NUMBERS": NO_NUMBERS}
+"""What words in values stand for."""

@@ -1,7 +1,5 @@
 """Rows of configurations, checked as the Snakefile checks them before any rule."""
 
-from __future__ import annotations
-
 from tests.hostile.cases import Table
 from tests.hostile.zoo import CONFIGURATION
 
@@ -72,44 +70,15 @@ for name, material in {
 for name, model in {
     "a command": '"$(touch x)"',
     "a slash": "../bar",
-    "capitals": "Bar",
-    "a blank": '"b r"',
-    "braces": '"{bar}"',
-    "nothing": '""',
-    "a leading dash": '"-bar"',
-    "a number": "5",
     "umlauts": "bär",
-    "a line break at its end": '"bar\\n"',
-    "a very long name": "b" * 300,
 }.items():
     hostile(f"model called {name}", "{bar:", "{" + f"{model}:")
 hostile("no launcher", "solver: {", "solver: {launcher: '', ", "launcher")
 
 # Numbers ------------------------------------------------------------------------------------------
 
-for value in (
-    "0",
-    "1",
-    "1.5",
-    "nan",
-    ".nan",
-    ".inf",
-    "1e9",
-    "true",
-    "null",
-    "'20'",
-    "2020-01-01",
-    str(10**30),
-    "1000000",
-    "[20]",
-    "-20",
-):
-    hostile(
-        f"resolution {value if len(value) < 25 else 'of thirty digits'}",
-        "resolution: 20",
-        f"resolution: {value}",
-        "resolution",
-    )
+for value in ("0", "1", "1.5", "nan", "null", "'20'", "2020-01-01", "1000000", "[20]", "-20"):
+    hostile(f"resolution {value}", "resolution: 20", f"resolution: {value}", "resolution")
 for key, values in {
     "unit": ("0", "-1", ".nan", ".inf", "1e300", "1e-300", "m"),
     "density": ("0", "-1", ".nan", "1e300", "1e-300"),

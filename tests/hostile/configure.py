@@ -1,7 +1,5 @@
 """What the Snakefile does with a configuration before any rule: as a program that can be forked."""
 
-from __future__ import annotations
-
 import sys
 
 from snakemake.common.configfile import load_configfile

@@ -1,11 +1,9 @@
 """Rows of `python -m dataset_gen`."""
 
-from __future__ import annotations
-
-from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table
+from tests.hostile.cases import CLOSED, NO_NUMBERS, Copy, Place, Table, unreadable
 
 TABLE = Table("dataset_gen")
-hostile, control, each = TABLE.hostile, TABLE.control, TABLE.each
+hostile, control, each, places = TABLE.hostile, TABLE.control, TABLE.each, TABLE.places
 
 MAKE = "generate --samples 200 --out s.h5"
 
@@ -17,7 +15,7 @@ hostile("no such option", f"{MAKE} --fast", "--fast")
 each(
     "samples",
     "generate --samples VALUE --out s.h5",
-    [*NO_WHOLE_NUMBERS, "0", "-1", str(2**63), str(10**30)],
+    "NO_WHOLE_NUMBERS 0 -1 2**63 10**30",
     "--samples",
 )
 each("seed", f"{MAKE} --seed VALUE", ["-1", "nan", str(2**63), str(2**64), str(10**30)], "seed")
@@ -38,16 +36,9 @@ each(
     "generate --samples 200 --out VALUE",
     [".", "", "/", "nowhere/s.h5", "/proc/s.h5", "x" * 300, "x" * 250, "s.h5/"],
 )
-for kind in ("folder", "null", "full", "pipe", "socket"):
-    hostile(f"out that is {kind}", MAKE, "s.h5", files={"s.h5": Place(kind)})
+places("out that is", MAKE, "s.h5", "s.h5")
 hostile("out that links to itself", MAKE, files={"s.h5": Place("link", "s.h5")})
-hostile(
-    "out in a closed folder",
-    "generate --samples 200 --out closed/s.h5",
-    "closed",
-    files={"closed": Place("folder", rights=0o555)},
-    plain=True,
-)
+hostile("out in a closed folder", "generate --samples 200 --out closed/s.h5", "closed", **CLOSED)
 hostile("out that is other work", MAKE, "s.h5", files={"s.h5": Copy("other.h5")})
 hostile("out that is modes", MAKE, "s.h5", files={"s.h5": Copy("modes.h5")})
 hostile("out that is words", MAKE, "s.h5", files={"s.h5": "my thesis\n"})
@@ -69,45 +60,15 @@ hostile("inspect nothing", "inspect", "file")
 each(
     "inspect",
     "inspect VALUE",
-    [
-        *(
-            f"ZOO/shard-{damage}.h5"
-            for damage in (
-                "cut",
-                "flipped",
-                "unsealed",
-                "longer",
-                "missing",
-                "words",
-                "complex",
-                "scalar",
-                "shape",
-                "nothing",
-                "group",
-                "nan",
-                "claims",
-                "link",
-                "outside",
-                "virtual",
-                "loop",
-                "kind",
-                "schema",
-                "no-kind",
-                "odd-schema",
-            )
-        ),
-        *("ZOO/modes.h5", "ZOO/forests.h5", "ZOO/design.h5", "ZOO/empty.h5", "ZOO/text.h5"),
-        *("ZOO/signature.h5", "ZOO/foreign.h5", "ZOO/metal.wav", "nowhere.h5", "", ".", "x" * 300),
-        *("ZOO/odd/folder.h5", "ZOO/odd/pipe.h5", "ZOO/odd/zero.h5", "ZOO/odd/null.h5"),
-        *("ZOO/odd/link.h5", "ZOO/odd/dangling.h5", "ZOO/odd/socket.h5"),
-    ],
+    (
+        "ZOO/shard-{cut,flipped,unsealed,longer,missing,words,complex,scalar,shape,nothing,group,"
+        "nan,claims,link,outside,virtual,loop,kind,schema,no-kind,odd-schema}.h5 ZOO/{modes,"
+        "forests,design,empty,text,signature,foreign}.h5 ZOO/metal.wav nowhere.h5 '' . LONG "
+        "ZOO/odd/{folder,pipe,zero,null,link,dangling,socket}.h5"
+    ),
 )
 hostile(
-    "inspect what may not be read",
-    "inspect s.h5",
-    "permission",
-    files={"s.h5": Copy("shard.h5", rights=0)},
-    plain=True,
+    "inspect what may not be read", "inspect s.h5", "permission", **unreadable("s.h5", "shard.h5")
 )
 
 control("generate", MAKE, "s.h5")

@@ -1,7 +1,5 @@
 """The suite as a fixture of pytest; the zoo is made once, whichever process needs it first."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

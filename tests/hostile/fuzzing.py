@@ -1,7 +1,5 @@
 """How much Hypothesis tries, and what it does to bytes and texts."""
 
-from __future__ import annotations
-
 import resource
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

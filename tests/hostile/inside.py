@@ -4,8 +4,6 @@ What it prints by other means than Python's streams is not seen, what it takes i
 same rows are tried as processes in the nightly tier.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -1,7 +1,5 @@
 """Programs that are killed at some moment of their run, and run again to the end."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """What can stand where a file is expected: folders, pipes, sockets, links, devices."""
 
-from __future__ import annotations
-
 import os
 import socket
 import stat

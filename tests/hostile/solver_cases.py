@@ -1,17 +1,18 @@
 """Rows of `python -m solver`."""
 
-from __future__ import annotations
-
 from tests.hostile import zoo_growing
-from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table
+from tests.hostile.cases import CLOSED, NO_NUMBERS, NO_WHOLE_NUMBERS, Copy, Place, Table, unreadable
 from tests.hostile.zoo_meshes import VALID_NAMES
 
 TABLE = Table("solver")
 hostile, control, each = TABLE.hostile, TABLE.control, TABLE.each
 
-BOX = "modes builtin:box --resolution 4 --modes 12 --method slepc"
+PLAIN = "modes builtin:box --resolution 4 --modes 12"
+BOX = f"{PLAIN} --method slepc"
 OUT = "--out out.h5"
 MODES = f"{BOX} {OUT}"
+SCALING = "scaling builtin:box --resolution 4 --modes 12 --ranks"
+TIMED = "benchmark builtin:box --resolution 4"
 
 # The command line ---------------------------------------------------------------------------------
 
@@ -32,13 +33,13 @@ hostile("bytes that are no text", [*BOX.split(), "--out", "out.h5", "--fast\udcf
 each(
     "resolution",
     "modes builtin:box --resolution VALUE --out out.h5",
-    [*NO_WHOLE_NUMBERS, "-1", "0", "1", str(10**30), "9223372036854775807", "1000000"],
+    "NO_WHOLE_NUMBERS -1 0 1 10**30 9223372036854775807 1000000",
     "resolution",
 )
 each(
     "modes",
     "modes builtin:box --resolution 4 --modes VALUE --out out.h5",
-    [*NO_WHOLE_NUMBERS, "-1", "0", "6", str(10**30), "9223372036854775807", "10000"],
+    "NO_WHOLE_NUMBERS -1 0 6 10**30 9223372036854775807 10000",
     "modes",
 )
 each("seed", f"{MODES} --seed VALUE", [*NO_WHOLE_NUMBERS, "-1", str(2**64), str(10**30)], "seed")
@@ -47,83 +48,40 @@ each("density", f"{MODES} --density VALUE", [*NO_NUMBERS, "0", "-1", "1e300", "1
 each(
     "Poisson's ratio",
     f"{MODES} --poisson VALUE",
-    [*NO_NUMBERS, "0.5", "-1", "1e300", "0.49999999999999999"],
+    "NO_NUMBERS 0.5 -1 1e300 0.49999999999999999",
     "poisson",
 )
 each("tolerance", f"{MODES} --tol VALUE", [*NO_NUMBERS, "-1"], "--tol")
-each(
-    "cutoff",
-    "modes builtin:box --resolution 4 --modes 12 --cutoff VALUE --out out.h5",
-    [*NO_NUMBERS, "0", "-1", "1e300", "1e-300"],
-    "cutoff",
-)
+each("cutoff", f"{PLAIN} --cutoff VALUE --out out.h5", "NO_NUMBERS 0 -1 1e300 1e-300", "cutoff")
 each(
     "corrections",
-    "modes builtin:box --resolution 4 --modes 12 --corrections VALUE --out out.h5",
-    ["-1", "1.5", str(2**63), str(10**30)],
+    f"{PLAIN} --corrections VALUE --out out.h5",
+    "-1 1.5 2**63 10**30",
     "--corrections",
 )
 each("keep", f"{MODES} --retained-modes VALUE", ["0", "-1", "nan", str(2**63)], "--retained-modes")
 each("subdomains", f"{MODES} --subdomains VALUE", ["0", "-1", "nan", str(2**63)], "--subdomains")
+each("ranks", f"{SCALING} VALUE", "0 -1 '' 1, 1,a 1000000 1,1000000 2**63 '1;2' 1.5", "ranks")
+each("latency", f"{SCALING} 1 --latency VALUE", "0 -1 nan inf", "--latency")
+each("bandwidth", f"{SCALING} 1 --bandwidth VALUE", "0 -1 nan inf", "--bandwidth")
+each("runs", f"{TIMED} --modes 12 --runs VALUE", ["0", "-1", "1e3"])
+each("slow runs", f"{TIMED} --modes 12 --runs 1 --slow-runs VALUE", "0 nan", "--slow-runs")
+each("modes timed", f"{TIMED} --modes VALUE --runs 1", "0 -5 6 2**64 1e2", "modes")
 each(
-    "ranks",
-    "scaling builtin:box --resolution 4 --modes 12 --ranks VALUE",
-    ["0", "-1", "", "1,", "1,a", "1000000", "1,1000000", str(2**63), "1;2", "1.5"],
-    "ranks",
-)
-each(
-    "latency",
-    "scaling builtin:box --resolution 4 --modes 12 --ranks 1 --latency VALUE",
-    ["0", "-1", "nan", "inf"],
-    "--latency",
-)
-each(
-    "bandwidth",
-    "scaling builtin:box --resolution 4 --modes 12 --ranks 1 --bandwidth VALUE",
-    ["0", "-1", "nan", "inf"],
-    "--bandwidth",
-)
-each("runs", "benchmark builtin:box --resolution 4 --modes 12 --runs VALUE", ["0", "-1", "1e3"])
-each(
-    "slow runs",
-    "benchmark builtin:box --resolution 4 --modes 12 --runs 1 --slow-runs VALUE",
-    ["0", "nan"],
-    "--slow-runs",
-)
-each(
-    "modes timed",
-    "benchmark builtin:box --resolution 4 --modes VALUE --runs 1",
-    ["0", "-5", "6", str(2**64), "1e2"],
-    "modes",
-)
-each(
-    "modes compared",
-    "objectives builtin:box --resolution 4 --modes VALUE",
-    ["0", "-5", "6", str(2**64)],
-    "modes",
+    "modes compared", "objectives builtin:box --resolution 4 --modes VALUE", "0 -5 6 2**64", "modes"
 )
 each(
     "modes rated",
     "coarsening builtin:box --resolution 4 --modes VALUE",
-    ["0", "-5", "6", "61", str(2**64), "1e1"],
+    "0 -5 6 61 2**64 1e1",
     "modes",
 )
-each(
-    "sizes compared",
-    "accuracy --solids sphere --levels VALUE",
-    ["0", "1", "5", str(2**64), "1e0"],
-    "levels",
-)
-each(
-    "solids compared",
-    "accuracy --solids VALUE",
-    ["", "cube", "block,", "block,,plate", "../block"],
-    "solids",
-)
+each("sizes compared", "accuracy --solids sphere --levels VALUE", "0 1 5 2**64 1e0", "levels")
+each("solids compared", "accuracy --solids VALUE", "'' cube block, block,,plate ../block", "solids")
 each(
     "accuracy",
-    "modes builtin:box --resolution 4 --modes 12 --accuracy VALUE --out out.h5",
-    [*NO_NUMBERS, "0", "-0.1", "1.1", "1e-300"],
+    f"{PLAIN} --accuracy VALUE --out out.h5",
+    "NO_NUMBERS 0 -0.1 1.1 1e-300",
     "--accuracy",
 )
 hostile("accuracy without an estimate", f"{MODES} --accuracy 0.1 --no-estimate", "--no-estimate")
@@ -131,7 +89,7 @@ hostile("estimate of a value", f"{MODES} --estimate=0.1", "--estimate")
 each(
     "error of modes refined to",
     f"{MODES} --coarsen average --refine-to VALUE",
-    ["", "-0.1", "nan", "inf", "11"],
+    "'' -0.1 nan inf 11 much",
     "--refine-to",
 )
 hostile("voxels that are refined", f"{MODES} --refine-to 0.1", "--refine-to", "--coarsen")
@@ -139,25 +97,25 @@ hostile("voxels that are refined to nothing", f"{MODES} --refine-to 0", "--refin
 each(
     "error refined to",
     "coarsening builtin:box --resolution 4 --refine-to VALUE",
-    ["0", "-0.1", "nan", "inf"],
+    "0 -0.1 nan inf",
     "--refine-to",
 )
 each(
     "rounds of all ways",
     "discretisation builtin:box --resolution 4 --runs VALUE",
-    ["0", "-1", "1e3"],
+    "0 -1 1e3",
     "--runs",
 )
 each(
     "modes followed",
     "convergence builtin:box --resolution 4 --modes VALUE --out out.json",
-    ["0", "-5", "6", str(2**64)],
+    "0 -5 6 2**64",
     "modes",
 )
 each(
     "steps",
     "convergence builtin:box --resolution 4 --modes 12 --out out.json --steps VALUE",
-    ["-1", "nan", str(10**30)],
+    "-1 nan 10**30",
     "--steps",
 )
 # Choices ------------------------------------------------------------------------------------------
@@ -200,33 +158,26 @@ each("mesh of a long name", MESH, ["x" * 300 + ".obj", "y/" * 3000 + "box.obj"])
 each(
     "mesh broken",
     MESH,
-    [
-        *(f"ZOO/empty.{end}" for end in ("obj", "stl", "ply", "glb", "off", "gltf", "3mf")),
-        *(f"ZOO/junk.{end}" for end in ("obj", "stl", "ply", "glb", "off", "gltf", "3mf")),
-        *("ZOO/cut.stl", "ZOO/cut.ply", "ZOO/cut.glb", "ZOO/claims.stl", "ZOO/claims.ply"),
-        *("ZOO/claims.off", "ZOO/claims.glb", "ZOO/foreign.gltf", "ZOO/relative.gltf"),
-        *("ZOO/box.xyzzy", "ZOO/box", "ZOO/words.obj", "ZOO/range.obj", "ZOO/below.obj"),
-        *("ZOO/index.obj", "ZOO/points.obj", "ZOO/nan.obj", "ZOO/inf.obj", "ZOO/beyond.obj"),
-        *("ZOO/latin.obj", "ZOO/nul.obj"),
-    ],
+    (
+        "ZOO/empty.obj ZOO/empty.stl ZOO/empty.ply ZOO/empty.glb ZOO/empty.off ZOO/empty.gltf "
+        "ZOO/empty.3mf ZOO/junk.obj ZOO/junk.stl ZOO/junk.ply ZOO/junk.glb ZOO/junk.off "
+        "ZOO/junk.gltf ZOO/junk.3mf ZOO/cut.stl ZOO/cut.ply ZOO/cut.glb ZOO/claims.stl "
+        "ZOO/claims.ply ZOO/claims.off ZOO/claims.glb ZOO/{foreign,relative}.gltf ZOO/box.xyzzy "
+        "ZOO/box ZOO/{words,range,below,index,points,nan,inf,beyond,latin,nul}.obj"
+    ),
 )
 each(
     "mesh that grows",
     MESH,
-    [
-        *(f"ZOO/grows-{name}.glb" for name in ("zeros", "sparse", "instances", "chain", "circle")),
-        *("ZOO/grows-rows.glb", "ZOO/grows-buffer.gltf", "ZOO/grows-parts.3mf"),
-        "ZOO/grows-parts.dae",
-    ],
+    (
+        "ZOO/grows-{zeros,sparse,instances,chain,circle,rows}.glb ZOO/grows-buffer.gltf "
+        "ZOO/grows-parts.3mf ZOO/grows-parts.dae"
+    ),
 )
 each(
     "mesh absurd",
     MESH,
-    [
-        *("ZOO/flat.obj", "ZOO/line.obj", "ZOO/point.obj", "ZOO/triangle.obj"),
-        *("ZOO/degenerate.obj", "ZOO/huge.obj", "ZOO/largest.obj", "ZOO/tiny.obj", "ZOO/far.obj"),
-        *("ZOO/needle.obj", "ZOO/apart.obj"),
-    ],
+    "ZOO/{flat,line,point,triangle,degenerate,huge,largest,tiny,far,needle,apart}.obj",
 )
 CELLS = "--resolution 8 --modes 12 --discretisation finite-cell --out out.h5"
 hostile("cells of a sheet", f"modes ZOO/triangle.obj {CELLS}", "encloses nothing")
@@ -242,22 +193,14 @@ hostile("cells that are coarsened", f"modes builtin:box {CELLS} --coarsen averag
 hostile(
     "cells among objectives", "objectives builtin:box --resolution 4 --discretisation finite-cell"
 )
-each(
-    "mesh that is",
-    MESH,
-    [
-        *("ZOO/odd/folder.obj", "ZOO/odd/pipe.obj", "ZOO/odd/socket.obj", "ZOO/odd/link.obj"),
-        *("ZOO/odd/dangling.obj", "ZOO/odd/null.obj", "ZOO/odd/zero.obj", "ZOO/odd/full.obj"),
-    ],
-)
+each("mesh that is", MESH, "ZOO/odd/{folder,pipe,socket,link,dangling,null,zero,full}.obj")
 hostile("mesh that is a WAV file", "modes ZOO/metal.wav --resolution 8 --out out.h5", "metal.wav")
 hostile("mesh that is HDF5", "modes ZOO/modes.h5 --resolution 8 --out out.h5", "modes.h5")
 hostile(
     "mesh that may not be read",
     "modes box.obj --resolution 8 --out out.h5",
     "permission",
-    files={"box.obj": Copy("box.obj", rights=0)},
-    plain=True,
+    **unreadable("box.obj", "box.obj"),
 )
 hostile("mesh with a leading dash", "modes -box.obj --resolution 8 --out out.h5")
 hostile(
@@ -298,18 +241,16 @@ each(
 each(
     "material that is",
     MATERIAL,
-    [
-        *("ZOO/odd/folder.npy", "ZOO/odd/pipe.npy", "ZOO/odd/socket.npy", "ZOO/odd/link.npy"),
-        *("ZOO/odd/zero.npy", "ZOO/odd/null.npy", "ZOO/odd/pipe.txt", "ZOO/odd/zero.txt"),
-        *("ZOO/modes.h5", "ZOO/metal.wav"),
-    ],
+    (
+        "ZOO/odd/{folder,pipe,socket,link,zero,null}.npy ZOO/odd/{pipe,zero}.txt ZOO/modes.h5 "
+        "ZOO/metal.wav"
+    ),
 )
 hostile(
     "material that may not be read",
     f"{MODES} --material young.npy",
     "permission",
-    files={"young.npy": Copy("good.npy", rights=0)},
-    plain=True,
+    **unreadable("young.npy", "good.npy"),
 )
 
 # Outputs ------------------------------------------------------------------------------------------
@@ -341,13 +282,7 @@ hostile(
     f"{BOX} --coarsen ddfem --forest f.h5 --out f.h5",
     files={"f.h5": Copy("forests.h5")},
 )
-hostile(
-    "out in a closed folder",
-    f"{BOX} --out closed/out.h5",
-    "closed/out.h5",
-    files={"closed": Place("folder", rights=0o555)},
-    plain=True,
-)
+hostile("out in a closed folder", f"{BOX} --out closed/out.h5", "closed/out.h5", **CLOSED)
 hostile("out on a full disk", MODES, "make room", file_size=2000)
 hostile("out on a disk full at once", MODES, "make room", file_size=0)
 for value in ("0", "nan", "2"):
@@ -356,7 +291,7 @@ hostile("audit into a folder", "audit ZOO/modes.h5 --out audits", files={"audits
 hostile("audit onto its input", "audit m.h5 --out m.h5", files={"m.h5": Copy("modes.h5")})
 hostile("audit onto a device", "audit ZOO/modes.h5 --out null", files={"null": Place("null")})
 hostile("audit on a full disk", "audit ZOO/modes.h5 --out a.json", "make room", file_size=100)
-hostile("benchmark into nowhere", "benchmark builtin:box --resolution 4 --out nowhere/row.json")
+hostile("benchmark into nowhere", f"{TIMED} --out nowhere/row.json")
 hostile("objectives into nowhere", "objectives builtin:box --resolution 4 --out nowhere/o.json")
 hostile("distance of nothing", "distance nowhere.stl", "nowhere.stl")
 hostile(
@@ -398,23 +333,14 @@ control(
 each(
     "comparison of",
     "compare VALUE ZOO/modes.h5",
-    [
-        *(
-            f"ZOO/modes-{damage}.h5"
-            for damage in ("nan", "eigenvalues-nan", "cut", "shape", "claims")
-        ),
-        *("ZOO/design.h5", "ZOO/bar.h5", "nowhere.h5"),
-    ],
+    "ZOO/modes-{nan,eigenvalues-nan,cut,shape,claims}.h5 ZOO/{design,bar}.h5 nowhere.h5",
 )
 hostile("comparison with another solid", "compare ZOO/modes.h5 ZOO/bar.h5")
 hostile("comparison with nothing", "compare ZOO/modes.h5", "truth")
 each(
     "response of",
     "respond VALUE --out out.h5",
-    [
-        *(f"ZOO/modes-{damage}.h5" for damage in ("nan", "eigenvalues-nan", "flipped", "unsealed")),
-        *("ZOO/shard.h5", "nowhere.h5"),
-    ],
+    "ZOO/modes-{nan,eigenvalues-nan,flipped,unsealed}.h5 ZOO/shard.h5 nowhere.h5",
 )
 hostile("response of another solid", "respond ZOO/modes.h5 ZOO/bar.h5 --out out.h5")
 hostile(
@@ -447,42 +373,20 @@ hostile("periods without end", "respond ZOO/modes.h5 --out out.h5 --periods 1e30
 each(
     "start from",
     f"{MODES} --initial-modes VALUE",
-    [
-        "ZOO/modes-nan.h5",
-        "ZOO/modes-cut.h5",
-        "ZOO/modes-shape.h5",
-        "ZOO/bar.h5",
-        "ZOO/shard.h5",
-        "nowhere.h5",
-        "ZOO/odd/pipe.h5",
-    ],
+    "ZOO/modes-{nan,cut,shape}.h5 ZOO/{bar,shard}.h5 nowhere.h5 ZOO/odd/pipe.h5",
 )
 each(
     "truth that is",
     "convergence builtin:box --resolution 4 --modes 12 --out c.json --truth VALUE",
-    ["ZOO/modes-eigenvalues-nan.h5", "ZOO/modes-cut.h5", "ZOO/bar.h5", "nowhere.h5"],
+    "ZOO/{modes-eigenvalues-nan,modes-cut,bar}.h5 nowhere.h5",
 )
 each(
     "forests that are",
     f"{MODES} --coarsen ddfem --forest VALUE",
-    [
-        *(
-            f"ZOO/forests-{damage}.h5"
-            for damage in (
-                "cut",
-                "flipped",
-                "unsealed",
-                "missing",
-                "words",
-                "complex",
-                "shape",
-                "claims",
-                "kind",
-                "schema",
-            )
-        ),
-        *("ZOO/modes.h5", "ZOO/text.h5", "nowhere.h5", "", "ZOO/odd/pipe.h5"),
-    ],
+    (
+        "ZOO/forests-{cut,flipped,unsealed,missing,words,complex,shape,claims,kind,schema}.h5 "
+        "ZOO/{modes,text}.h5 nowhere.h5 '' ZOO/odd/pipe.h5"
+    ),
 )
 hostile("forests of another ratio", f"{MODES} --coarsen ddfem --poisson 0.3", "0.3")
 
@@ -498,7 +402,7 @@ hostile("tolerance below rounding", f"{MODES} --tol 1e-300", "--tol")
 # Controls -----------------------------------------------------------------------------------------
 
 control("the box", MODES, "out.h5")
-control("component modes", "modes builtin:box --resolution 4 --modes 12 --out out.h5", "out.h5")
+control("component modes", f"{PLAIN} --out out.h5", "out.h5")
 control(
     "a mesh file by forests",
     "modes ZOO/box.obj --resolution 8 --modes 12 --coarsen ddfem --out out.h5",

@@ -1,7 +1,5 @@
 """Rows of `python -m studio`: scenes; the server has tests of its own."""
 
-from __future__ import annotations
-
 from tests.hostile.cases import Copy, Table
 from tests.hostile.zoo_texts import hostile_yaml
 
@@ -43,7 +41,7 @@ for name, text in hostile_yaml().items():
 each(
     "out",
     ["scene", "s.yaml", "--out", "VALUE"],
-    ["o.mp3", "o", "", ".", "nowhere/o.wav", "s.yaml"],
+    "o.mp3 o '' . nowhere/o.wav s.yaml",
     files={"s.yaml": scene()},
 )
 for option, wrong in (

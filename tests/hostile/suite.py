@@ -1,7 +1,5 @@
 """A row of the table is run, and everything that it must not do is looked for."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

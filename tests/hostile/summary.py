@@ -1,7 +1,5 @@
 """What was tried, refused, killed and how long it took: a table at the end of a session."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 

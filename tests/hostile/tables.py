@@ -1,7 +1,5 @@
 """All tables by the name of their room."""
 
-from __future__ import annotations
-
 from tests.hostile import (
     carillon_cases,
     configuration_cases,

@@ -1,10 +1,8 @@
 """Rows of `python -m workflow`."""
 
-from __future__ import annotations
-
 import json
 
-from tests.hostile.cases import NO_NUMBERS, NO_WHOLE_NUMBERS, Place, Table
+from tests.hostile.cases import CLOSED, NO_NUMBERS, NO_WHOLE_NUMBERS, Place, Table
 from tests.hostile.zoo import CONFIGURATION
 from tests.hostile.zoo_texts import hostile_yaml
 
@@ -19,37 +17,23 @@ hostile("no such command", "run", "run")
 each(
     "configuration",
     "estimate --configfile VALUE",
-    [
-        *(
-            f"ZOO/config-{name}.yaml"
-            for name in ("twice", "bomb", "nested", "long", "nul", "latin", "tag", "second", "cut")
-        ),
-        *("ZOO/metal.wav", "ZOO/modes.h5", "ZOO/box.obj", "ZOO/project.yaml", "nowhere.yaml"),
-        *("", ".", "x" * 300 + ".yaml"),
-        *("ZOO/odd/folder.yaml", "ZOO/odd/pipe.yaml", "ZOO/odd/zero.yaml", "ZOO/odd/link.yaml"),
-        *("ZOO/odd/null.yaml", "ZOO/odd/socket.yaml"),
-    ],
+    (
+        "ZOO/config-{twice,bomb,nested,long,nul,latin,tag,second,cut}.yaml ZOO/metal.wav "
+        "ZOO/modes.h5 ZOO/box.obj ZOO/project.yaml nowhere.yaml '' . LONG.yaml ZOO/odd/{folder,"
+        "pipe,zero,link,null,socket}.yaml"
+    ),
 )
 for name, content in hostile_yaml().items():
-    hostile(
-        f"configuration: {name}",
-        "estimate --configfile c.yaml",
-        files={"c.yaml": content},
-    )
+    hostile(f"configuration: {name}", "estimate --configfile c.yaml", files={"c.yaml": content})
 each("nodes", "estimate --preset tiny --nodes VALUE", [*NO_WHOLE_NUMBERS, "0", "-1"], "--nodes")
-each(
-    "cores",
-    "estimate --preset tiny --cores-per-node VALUE",
-    ["0", "-1", "nan", str(2**64)],
-    "--cores-per-node",
-)
+each("cores", "estimate --preset tiny --cores-per-node VALUE", "0 -1 nan 2**64", "--cores-per-node")
 hostile("no such preset", "estimate --preset gigantic", "gigantic")
 hostile("preset and file", "estimate --preset tiny --configfile ZOO/config.yaml", "--configfile")
 hostile("no such objective", "estimate --preset tiny --objective best", "best")
 each(
     "results of a run",
     "estimate --preset tiny --results VALUE",
-    ["nowhere", "ZOO/metal.wav", "ZOO/odd", "ZOO", ""],
+    "nowhere ZOO/metal.wav ZOO/odd ZOO ''",
 )
 hostile(
     "results without benchmarks",
@@ -77,7 +61,7 @@ GOOD = {"a/tables/spectra.json": TABLE_FILE, "b/tables/spectra.json": TABLE_FILE
 each(
     "folder",
     "compare VALUE b",
-    ["nowhere", "", ".", "ZOO", "b/tables/spectra.json", "x" * 300, "ZOO/odd/pipe.h5", "/dev/null"],
+    "nowhere '' . ZOO b/tables/spectra.json LONG ZOO/odd/pipe.h5 /dev/null",
     files=GOOD,
 )
 for name, text in {
@@ -138,26 +122,11 @@ hostile("out that is one of both", "compare a b --out a/tables", files=GOOD)
 each(
     "digest",
     "digest VALUE",
-    [
-        "nowhere.h5",
-        "",
-        "ZOO/text.h5",
-        "ZOO/empty.h5",
-        "ZOO/metal.wav",
-        "ZOO/shard-cut.h5",
-        "ZOO/shard-flipped.h5",
-        "ZOO/modes-claims.h5",
-        "ZOO/modes-link.h5",
-        "ZOO/modes-outside.h5",
-        "ZOO/modes-virtual.h5",
-        "ZOO/modes-unsealed.h5",
-        "ZOO/odd/pipe.h5",
-        "ZOO/odd/zero.h5",
-        "ZOO/odd/folder.h5",
-        "ZOO/odd/link.h5",
-        "x" * 300,
-        "/dev/null",
-    ],
+    (
+        "nowhere.h5 '' ZOO/{text,empty}.h5 ZOO/metal.wav ZOO/{shard-cut,shard-flipped,modes-claims,"
+        "modes-link,modes-outside,modes-virtual,modes-unsealed}.h5 ZOO/odd/{pipe,zero,folder,"
+        "link}.h5 LONG /dev/null"
+    ),
 )
 hostile("digest of nothing", "digest", "paths")
 
@@ -201,17 +170,10 @@ for option, values in {
 each(
     "validate",
     "validate VALUE --resolution 4 --cores 1 --out o",
-    [
-        "nowhere.obj",
-        "builtin:nothing",
-        "ZOO/nan.obj",
-        "ZOO/flat.obj",
-        "ZOO/odd/pipe.obj",
-        "ZOO/odd/folder.obj",
-        "",
-        "ZOO/huge.obj",
-        "ZOO/metal.wav",
-    ],
+    (
+        "nowhere.obj builtin:nothing ZOO/{nan,flat}.obj ZOO/odd/{pipe,folder}.obj '' ZOO/huge.obj "
+        "ZOO/metal.wav"
+    ),
 )
 hostile("validate into a file", VALIDATE, "o", files={"o": "text"})
 hostile("validate into a device", VALIDATE, "o", files={"o": Place("null")})
@@ -219,10 +181,7 @@ hostile("validate below a file", f"{VALIDATE}/p", files={"o": "text"})
 hostile("validate into /proc", VALIDATE.replace("--out o", "--out /proc/o"))
 hostile("validate into a long name", VALIDATE.replace("--out o", "--out " + "x" * 300))
 hostile(
-    "validate into a closed folder",
-    f"{VALIDATE.replace('--out o', '--out closed/o')}",
-    files={"closed": Place("folder", rights=0o555)},
-    plain=True,
+    "validate into a closed folder", f"{VALIDATE.replace('--out o', '--out closed/o')}", **CLOSED
 )
 
 # recordings ---------------------------------------------------------------------------------------
@@ -230,7 +189,7 @@ hostile(
 each(
     "out",
     "recordings --out VALUE",
-    ["ZOO/modes.h5", "ZOO/odd/pipe.h5", "/proc/o", "/dev/null", "x" * 300, "ZOO/modes.h5/o"],
+    "ZOO/modes.h5 ZOO/odd/pipe.h5 /proc/o /dev/null LONG ZOO/modes.h5/o",
 )
 hostile("recordings without a place", "recordings", "--out")
 

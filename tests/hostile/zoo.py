@@ -3,8 +3,6 @@
 Made once per session, in a folder that nothing may change afterwards.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.hostile import zoo_growing, zoo_hdf5, zoo_meshes, zoo_numbers, zoo_texts
@@ -59,7 +57,7 @@ class Zoo:
         self.folder = folder
 
     @classmethod
-    def made(cls, folder: Path, zygote: Zygote) -> Zoo:
+    def made(cls, folder: Path, zygote: Zygote) -> "Zoo":
         """Make all files in `folder`, with programs that `zygote` runs."""
         folder.mkdir(parents=True)
         folder.chmod(0o755)

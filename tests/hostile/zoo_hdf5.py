@@ -1,7 +1,5 @@
 """HDF5 files of every kind, damaged in every way: some caught by the seal, some with a new one."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

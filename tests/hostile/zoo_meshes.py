@@ -1,7 +1,5 @@
 """Meshes: a valid box in several formats, and files that are broken or absurd."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path
@@ -79,8 +77,7 @@ def _make_absurd(folder: Path, box: trimesh.Trimesh) -> None:
 
 def _make_liars(folder: Path) -> None:
     """Heads that promise more than there is."""
-    facets = struct.pack("<80sI", b"", 2**31 - 1) + bytes(50)
-    (folder / "claims.stl").write_bytes(facets)
+    (folder / "claims.stl").write_bytes(struct.pack("<80sI", b"", 2**31 - 1) + bytes(50))
     (folder / "claims.ply").write_text(
         "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n"
         "property float y\nproperty float z\nelement face 4000000000\n"

@@ -1,7 +1,5 @@
 """Arrays of moduli and sounds: valid ones, and all else that a file can hold in their place."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """YAML and JSON: projects and configurations that are broken, hostile or no such thing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 BOMB = "\n".join(
