@@ -135,25 +135,23 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write("\n".join([*told, ""]))
 
 
-def _environment(threads: int, extra: Mapping[str, str] | None) -> dict[str, str]:
+def _run(
+    command: list[str],
+    threads: int,
+    *,
+    timeout: float = HANG_SECONDS,
+    check: bool = False,
+    env: Mapping[str, str] | None = None,
+    cwd: Path | str | None = None,
+) -> subprocess.CompletedProcess[str]:
     # What a command that was called in this process has set is not handed on: with a safe path,
     # `python -m mpi4py SCRIPT` looks for modules beside the script in place of PYTHONPATH.
     given = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
     own = {"OMP_NUM_THREADS": str(threads), "PYTHONPATH": str(CHECKOUT)}
-    return {**given, **own, **RANKS, **(extra or {})}
-
-
-def _run(
-    command: list[str],
-    environment: dict[str, str],
-    timeout: float,
-    check: bool,
-    cwd: Path | str | None,
-) -> subprocess.CompletedProcess[str]:
     try:
         done = subprocess.run(
             command,
-            env=environment,
+            env={**given, **own, **RANKS, **(env or {})},
             timeout=timeout,
             cwd=cwd or CHECKOUT,
             capture_output=True,
@@ -262,16 +260,9 @@ def start_cli() -> Run:
     added to the environment), `cwd`.
     """
 
-    def run(
-        module: str,
-        *arguments: object,
-        timeout: float = HANG_SECONDS,
-        check: bool = False,
-        env: Mapping[str, str] | None = None,
-        cwd: Path | str | None = None,
-    ) -> subprocess.CompletedProcess[str]:
+    def run(module: str, *arguments: object, **how: Any) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", module, *map(str, arguments)]
-        return _run(command, _environment(allowed_threads(), env), timeout, check, cwd)
+        return _run(command, allowed_threads(), **how)
 
     return run
 
@@ -288,19 +279,12 @@ def mpiexec() -> Run:
         pytest.fail("no mpiexec on PATH; run the tests with `make test`, which installs MPI")
 
     def run(
-        ranks: int,
-        module: str | Path,
-        *arguments: object,
-        timeout: float = HANG_SECONDS,
-        check: bool = False,
-        env: Mapping[str, str] | None = None,
-        cwd: Path | str | None = None,
+        ranks: int, module: str | Path, *arguments: object, **how: Any
     ) -> subprocess.CompletedProcess[str]:
         target = [str(module)] if str(module).endswith(".py") else ["-m", str(module)]
         program = [sys.executable, "-m", "mpi4py", *target, *map(str, arguments)]
         command = [launcher, "-n", str(ranks), *program]
-        threads = max(1, allowed_threads() // ranks)
-        return _run(command, _environment(threads, env), timeout, check, cwd)
+        return _run(command, max(1, allowed_threads() // ranks), **how)
 
     return run
 

@@ -51,10 +51,10 @@ def bring(entry: dict[str, Any], listed: bool) -> None:
     name = f"{entry['package']}@{entry['version']}"
     with tempfile.TemporaryDirectory() as scratch:
         content, integrity = load(entry["package"], entry["version"], Path(scratch))
-        wanted = entry["integrity"] if listed else integrity
-        if integrity_of(content) != wanted:
-            sys.exit(f"{name}: its SHA-512 is {integrity_of(content)}, expected {wanted}")
-        entry["integrity"] = wanted
+        expected = entry["integrity"] if listed else integrity
+        if integrity_of(content) != expected:
+            sys.exit(f"{name}: its SHA-512 is {integrity_of(content)}, expected {expected}")
+        entry["integrity"] = expected
         packed = next(Path(scratch).glob("*.tgz"))
         with tarfile.open(packed) as archive:
             for file in entry["files"]:

@@ -103,12 +103,8 @@ class Mesh:
 def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     """The surface in a mesh file (OBJ, STL, PLY, OFF, glTF), or `builtin:NAME`.
 
-    Raises UserError if there is no such mesh, or it is no surface around a solid.
-
-    Parameters
-    ----------
-    unit
-        Metres per unit of the file.
+    Raises UserError if there is no such mesh, or it is no surface around a solid. `unit`: metres
+    per unit of the file.
 
     Examples
     --------
@@ -156,16 +152,14 @@ class Material:
         """
         from sound.scenes.materials import named_material
 
-        found = named_material(name)
-        return cls(found.young, found.poisson, found.density, (found.alpha, found.beta))
+        row = named_material(name)
+        return cls(row.young, row.poisson, row.density, (row.alpha, row.beta))
 
     def moduli(self, mesh: HexMesh) -> Array:
         """Young's modulus (m,), or (m, 8) if given so, of the voxels of a mesh [Pa].
 
-        Raises
-        ------
-        UserError
-            If a name or a file is unknown; what is wrong with numbers is said when they are used.
+        Raises UserError if a name or a file is unknown; what is wrong with numbers is said when
+        they are used.
         """
         if isinstance(self.young, str):
             return materials.young_modulus(self.young, mesh, self.seed)
@@ -334,12 +328,12 @@ def solve(
     ranks = MPI.COMM_WORLD if comm is None else comm
     solid = compute_on_root(ranks, lambda: _solid(body, material, resolution, discretisation))
     start = None if initial is None or initial.shapes is None else initial._file().modes
-    found = library.solve(
+    result = library.solve(
         solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
     )
-    evidence = {"method": method, **found.evidence, "timings": found.seconds}
-    values = (found.eigenvalues, found.frequencies, found.residuals)
-    return Solution(*values, _shapes(found.modes), solid, evidence)
+    evidence = {"method": method, **result.evidence, "timings": result.seconds}
+    values = (result.eigenvalues, result.frequencies, result.residuals)
+    return Solution(*values, _shapes(result.modes), solid, evidence)
 
 
 def coarsen(
@@ -505,14 +499,14 @@ def render(
     if at is not None:
         places = np.asarray(at, dtype=float).reshape(-1, 3).tolist()
         points = [Point(at=(x, y, z)) for x, y, z in places]
-    found = heard.places([("at", point) for point in points])
+    struck = heard.places([("at", point) for point in points])
     count = len(points)
     hits = [
         Hit(float(begin), position, float(impulse) * inward, distance)
         for begin, impulse, (position, inward, distance) in zip(
             np.broadcast_to(np.asarray(times, dtype=float), count),
             np.broadcast_to(np.asarray(strength, dtype=float), count),
-            found,
+            struck,
         )
     ]
     length = seconds or max(hit.seconds for hit in hits) + ringing_seconds(heard.solid)
@@ -600,12 +594,8 @@ class Design:
     def export(self, path: str | Path, points: int = 0) -> None:
         """Write it for other tools: .h5, .gltf, .glb, .dsp (Faust) or .npy (moduli).
 
-        Raises UserError if the ending tells no format, or the file cannot be written.
-
-        Parameters
-        ----------
-        points
-            Struck points of a Faust program, besides the targets'.
+        Raises UserError if the ending tells no format, or the file cannot be written. `points`:
+        struck points of a Faust program, besides the targets'.
         """
         from sound.export.formats import export_design, format_of
 
@@ -716,12 +706,8 @@ class Forests:
 def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -> None:
     """Draw random blocks, fit a coarse element to each, and write them to a shard for `train`.
 
-    Raises UserError for impossible options, or if the file cannot be written.
-
-    Parameters
-    ----------
-    options
-        `seed`, `objective` and the other options of `carillon generate`, with underscores.
+    Raises UserError for impossible options, or if the file cannot be written. `options`: `seed`,
+    `objective` and the other options of `carillon generate`, with underscores.
 
     Examples
     --------
@@ -747,12 +733,8 @@ def train(
 ) -> Forests:
     """Train forests on shards of `generate` and write them to a file.
 
-    Raises UserError for impossible options, unusable shards or too few samples.
-
-    Parameters
-    ----------
-    options
-        `trees`, `depth` and the other options of `carillon train`, with underscores.
+    Raises UserError for impossible options, unusable shards or too few samples. `options`: `trees`,
+    `depth` and the other options of `carillon train`, with underscores.
 
     Examples
     --------

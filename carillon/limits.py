@@ -43,10 +43,7 @@ def require_constants(poisson: float, density: float) -> None:
 def require_within(what: str, value: float, limits: tuple[float, float]) -> None:
     """Check that a number is within limits, both of them included.
 
-    Raises
-    ------
-    UserError
-        If it is not; `what` names it and its value.
+    Raises UserError if it is not; `what` names it and its value.
 
     Examples
     --------

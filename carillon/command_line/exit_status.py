@@ -32,6 +32,9 @@ Comm = Any
 def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
     """Call `main` and turn errors meant for the user into a sentence and an exit status.
 
+    That is 0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130
+    for an interrupt from the keyboard.
+
     Parameters
     ----------
     comm
@@ -39,11 +42,6 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
         are told by the first one, and every rank returns; after any other the job is aborted, so
         that nobody waits for a rank that is gone.
 
-    Returns
-    -------
-    int
-        0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130 for
-        an interrupt from the keyboard.
     """
     _require_streams()
     logs.show()

@@ -6,8 +6,18 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from carillon.command_line.picture_formats import require_plottable
+from carillon.errors import UserError
 from carillon.files.paths import require_writable
+
+FORMATS = (".png", ".svg", ".pdf")
+
+
+def require_plottable(path: str | Path) -> Path:
+    """Raise UserError unless `path` ends as a picture does."""
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise UserError(f"{path}: a picture's name ends with {', '.join(FORMATS)}")
+    return path
 
 
 def require_outputs(arguments: argparse.Namespace, inputs: Sequence[str | Path] = ()) -> None:

@@ -70,6 +70,8 @@ def draw(
 ) -> Poly3DCollection:
     """Draw the surface of a mesh, deformed if asked for, lit from the upper left.
 
+    Returns the polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
+
     Raises ValueError if an array's shape or `up` does not fit.
 
     Parameters
@@ -97,10 +99,6 @@ def draw(
     skin
         What is drawn instead of the faces of the cells, in the same place, size and light.
 
-    Returns
-    -------
-    Poly3DCollection
-        The polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

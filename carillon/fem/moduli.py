@@ -28,13 +28,9 @@ def require_moduli(
 ) -> Array:
     """Moduli [Pa] that a user gives, (cells,) or (cells, 8), as floats of the same shape.
 
-    Without `points` those of quadrature points are refused.
-
-    Raises
-    ------
-    UserError
-        If they are of another shape, no real numbers, not finite, not positive, or beyond the
-        limits of `carillon.limits`; `source` is where they are from.
+    Without `points` those of quadrature points are refused. Raises UserError if they are of another
+    shape, no real numbers, not finite, not positive, or beyond the limits of `carillon.limits`;
+    `source` is where they are from.
 
     Examples
     --------
@@ -43,7 +39,7 @@ def require_moduli(
     >>> require_moduli([1e9, -2e9], cells=2)
     Traceback (most recent call last):
     carillon.errors.UserError: moduli: 1 values are negative (the first at index 1: -2e+09); \
-expected Young's moduli [Pa]
+    expected Young's moduli [Pa]
     """
     shapes = ((cells,), (cells, POINTS)) if points else ((cells,),)
     values = _not_negative(young, shapes, source)

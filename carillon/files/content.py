@@ -37,15 +37,11 @@ _PIECE = 1 << 20
 def require_whole(file: h5py.File) -> None:
     """Check that what a file holds lies in it, where a checksum covers it, is all there, and once.
 
-    Then nothing that is read of it takes more memory than the file has bytes, but for a factor
-    that is known; of the numbers nothing is read here.
-
-    Raises
-    ------
-    UserError
-        If there is a link other than the one name of its own content, or a dataset whose numbers
-        are those of other files, were never written, are compressed, or take more room than the
-        file has; or if texts are references, or together longer than the file.
+    Then nothing that is read of it takes more memory than the file has bytes, but for a factor that
+    is known; of the numbers nothing is read here. Raises UserError if there is a link other than
+    the one name of its own content, or a dataset whose numbers are those of other files, were never
+    written, are compressed, or take more room than the file has; or if texts are references, or
+    together longer than the file.
     """
     size = file.id.get_filesize()
     longest = cache(partial(_longest_heap, Path(file.filename)))

@@ -25,12 +25,8 @@ def find(
 ) -> h5py.Dataset:
     """The dataset `name`, which is there and has this shape and kind of numbers.
 
-    `shape`: None stands for any length.
-
-    Raises
-    ------
-    UserError
-        If it is anything else; nothing of it has been read then.
+    `shape`: None stands for any length. Raises UserError if it is anything else; nothing of it has
+    been read then.
     """
     dataset = group.get(name)
     if not isinstance(dataset, h5py.Dataset):

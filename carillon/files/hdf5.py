@@ -24,11 +24,7 @@ LONGEST_KIND = 40
 SEAL_BYTES = 512
 """Length of the seal, which stands before the HDF5 file proper (its user block)."""
 
-_FAULTS = {
-    OSError: "damaged",
-    KeyError: "incomplete",
-    Exception: "not what it should be",
-}
+_FAULTS = {OSError: "damaged", KeyError: "incomplete", Exception: "not what it should be"}
 _NONSENSE = (
     OSError,
     LookupError,
@@ -175,7 +171,8 @@ def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> I
         _require_kind(path, file, kind, schema)
         if sealed and not found_seal:
             raise UserError(f"{path}: {_UNSEALED}")
-        _require_whole(path, file)
+        with _damaged_by(path, *_NONSENSE):
+            require_whole(file)
         try:
             yield file
         except ConvergenceError:
@@ -221,23 +218,20 @@ def _opened(path: str | Path) -> h5py.File:
     return h5py.File(path, "r", locking=False)
 
 
-def _require_whole(path: Path, file: h5py.File) -> None:
+@contextmanager
+def _damaged_by(path: Path, *faults: type[Exception]) -> Iterator[None]:
     try:
-        require_whole(file)
-    except _NONSENSE as error:
+        yield
+    except faults as error:
         raise UserError(
             f"{path}: is damaged ({first_line(error)}); generate the file again"
         ) from None
 
 
 def _require_kind(path: Path, file: h5py.File, kind: str, schema: int) -> None:
-    try:
+    with _damaged_by(path, Exception):  # HDF5 has many ways to say that bytes make no sense
         stored_kind = str(_claimed(file, "kind", "something else"))
         stored_schema = int(_claimed(file, "schema_version", -1))
-    except Exception as error:  # HDF5 has many ways to say that bytes make no sense
-        raise UserError(
-            f"{path}: is damaged ({first_line(error)}); generate the file again"
-        ) from None
     if stored_kind != kind:
         raise UserError(
             f"{path}: holds {stored_kind[:LONGEST_KIND]!r}, expected a Carillon {kind} file"

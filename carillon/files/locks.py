@@ -40,13 +40,9 @@ def locked(path: str | Path) -> Iterator[None]:
 def take(name: Path, refusal: str) -> int:
     """Open the file `name`, made if need be, for this process alone; closing it gives it back.
 
-    Who removes the file must do so before closing it.
-
-    Raises
-    ------
-    UserError
-        With the sentence `refusal` if another process has it; if it cannot be opened or is no
-        regular file, but a link, pipe or device.
+    Who removes the file must do so before closing it. Raises UserError with the sentence `refusal`
+    if another process has it; if it cannot be opened or is no regular file, but a link, pipe or
+    device.
     """
     flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
     while True:

@@ -39,9 +39,6 @@ _PIPE_BYTES = 1 << 20
 _PR_SET_PDEATHSIG = 1
 
 
-# Programs ----------------------------------------------------------------------------------------
-
-
 def run_child(
     command: Sequence[str], environment: Mapping[str, str]
 ) -> subprocess.CompletedProcess[str]:
@@ -89,9 +86,6 @@ def _end(child: subprocess.Popen[str]) -> None:
         child.communicate(timeout=PATIENCE_SECONDS)
     except subprocess.TimeoutExpired:
         child.kill()
-
-
-# Processes ---------------------------------------------------------------------------------------
 
 
 def start_process(work: Callable[..., None], *arguments: Any) -> SpawnProcess:

@@ -13,7 +13,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, MutableMapping
+from collections.abc import MutableMapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -134,9 +134,8 @@ def _take_over(old: Path, new: Path) -> None:
             os.replace(each, new / each.name)
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    for pattern in _COMPILED:
-        yield from folder.glob(pattern)
+def _files(folder: Path) -> list[Path]:
+    return [each for pattern in _COMPILED for each in folder.glob(pattern)]
 
 
 def _can_be_made(folder: str) -> bool:

@@ -33,27 +33,21 @@ def available_memory() -> int | None:
 
     None where the system does not tell.
     """
-    limits = [_memory_of_machine(), _memory_of_group()]
-    known = [each for each in limits if each is not None]
-    return min(known) if known else None
-
-
-def _memory_of_machine() -> int | None:
+    known = []
     with suppress(OSError, ValueError):
-        return _field("/proc/meminfo", "MemAvailable:")
-    return None
+        known.append(_field("/proc/meminfo", "MemAvailable:"))
+    with suppress(OSError, ValueError, StopIteration):
+        known.append(_memory_of_group())
+    return min(known, default=None)
 
 
-def _memory_of_group() -> int | None:
+def _memory_of_group() -> int:
     """What a limit of version 2 leaves; cached files make room when memory is asked for."""
     group = Path("/sys/fs/cgroup")
-    try:
-        limit = int((group / "memory.max").read_text())
-        used = int((group / "memory.current").read_text())
-        lines = (group / "memory.stat").read_text().splitlines()
-        cached = next(int(line.split()[1]) for line in lines if line.startswith("file "))
-    except (OSError, ValueError, StopIteration):
-        return None
+    limit = int((group / "memory.max").read_text())
+    used = int((group / "memory.current").read_text())
+    lines = (group / "memory.stat").read_text().splitlines()
+    cached = next(int(line.split()[1]) for line in lines if line.startswith("file "))
     return max(0, limit - used + cached)
 
 

@@ -37,11 +37,7 @@ def limit_threads(ranks: int) -> int:
 
     Returns the number of BLAS threads now allowed in this process.
     """
-    cores = allowed_cores()
-    threads = max(1, cores // max(1, ranks))
-    requested = os.environ.get("OMP_NUM_THREADS", "")
-    if requested.isdigit() and int(requested) > 0:
-        threads = min(threads, int(requested))
+    threads = min(max(1, allowed_cores() // max(1, ranks)), allowed_threads())
     ThreadpoolController().limit(limits=threads)
     os.environ["OMP_NUM_THREADS"] = str(threads)
     return threads

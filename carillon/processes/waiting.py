@@ -27,12 +27,8 @@ def leave_cores(comm: Comm) -> bool:
     """Have ranks sleep between their looks for messages if they share cores; collective.
 
     They do if their machine has fewer cores for them, or if `OMPI_MCA_mpi_yield_when_idle=1` tells
-    that other programs run besides.  Nothing happens under another MPI than Open MPI.
-
-    Returns
-    -------
-    bool
-        Whether this rank does from now on.
+    that other programs run besides.  Nothing happens under another MPI than
+    Open MPI. Returns whether this rank does from now on.
     """
     return _share_cores(comm) and _nap_while_waiting()
 

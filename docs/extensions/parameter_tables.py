@@ -67,16 +67,9 @@ def _type(domain: ValueDomain) -> str:
         kind += f" of ({_type(domain.items[0])})"
         kind += "" if domain.endless else f", {len(domain.items)} long"
     known = _LENGTHS if domain.kind in (tuple, dict) else _BOUNDS
-    return ", ".join(
-        [
-            kind,
-            *(
-                text.format(_number(domain.limits[name]))
-                for name, text in known.items()
-                if name in domain.limits
-            ),
-        ]
-    )
+    limits = domain.limits
+    bounds = [known[name].format(_number(limits[name])) for name in known if name in limits]
+    return ", ".join([kind, *bounds])
 
 
 def _number(value: float) -> str:

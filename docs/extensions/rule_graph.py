@@ -13,11 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from carillon.command_line import exit_status
-from carillon.errors import UserError
 from workflow import settings
 
-PROGRAM = "rule_graph"
 PICTURE = Path(__file__).resolve().parent.parent / "rules.svg"
 TARGET = "all"
 """The rule that computes nothing, which is left out."""
@@ -28,61 +25,31 @@ node [shape=box, style="rounded,filled", fillcolor="#eef3f8", color="#4a6f96",
 edge [color="#8a94a0", arrowsize=0.6]"""
 
 
-def needs() -> list[tuple[str, str]]:
-    """Pairs of a rule of the default run and one that needs its files."""
-    command = [
-        sys.executable,
-        "-m",
-        "snakemake",
-        "-s",
-        str(settings.FOLDER / "Snakefile"),
-        "--rulegraph",
-    ]
-    with tempfile.TemporaryDirectory() as folder:
-        return pairs(_output_of([*command, "--cores", "1"], folder))
+def output_of(command: list[str], text: str = "", folder: str | None = None) -> str:
+    """What a program prints about a text."""
+    environment = {**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)}
+    return subprocess.run(
+        command,
+        input=text,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    ).stdout
 
 
-def pairs(graph: str) -> list[tuple[str, str]]:
-    """The arrows of a graph of Snakemake's, by the names of the rules."""
-    names = dict(re.findall(r'(\d+)\[label = "(\w+)"', graph))
-    arrows = re.findall(r"(\d+) -> (\d+)", graph)
-    return sorted((names[first], names[then]) for first, then in arrows if names[then] != TARGET)
-
-
-def draw(arrows: list[tuple[str, str]]) -> str:
-    """The rules as SVG, from the first to the last.
-
-    Raises UserError if Graphviz is not installed.
-    """
-    lines = [STYLE, *(f"{first} -> {then}" for first, then in arrows)]
-    graph = "digraph rules {\n" + "\n".join(lines) + "\n}\n"
-    return _output_of(["dot", "-Tsvg"], text=_output_of(["tred"], text=graph))
-
-
-def _output_of(command: list[str], folder: str | None = None, text: str | None = None) -> str:
-    try:
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": str(settings.FOLDER.parent)},
-            input=text,
-            capture_output=True,
-            text=True,
-        )
-    except FileNotFoundError:
-        raise UserError(
-            f"no {command[0]} on PATH to draw the rules with; install Graphviz"
-        ) from None
-    if done.returncode:
-        raise UserError(f"{command[0]} failed: {done.stderr.strip()}")
-    return done.stdout
-
-
-def main() -> int:
+def main() -> None:
     """Draw the picture anew."""
-    PICTURE.write_text(draw(needs()))
-    return 0
+    snakemake = [sys.executable, "-m", "snakemake", "-s", str(settings.FOLDER / "Snakefile")]
+    with tempfile.TemporaryDirectory() as folder:
+        graph = output_of([*snakemake, "--rulegraph", "--cores", "1"], folder=folder)
+    names = dict(re.findall(r'(\d+)\[label = "(\w+)"', graph))
+    pairs = [(names[first], names[then]) for first, then in re.findall(r"(\d+) -> (\d+)", graph)]
+    arrows = [f"{first} -> {then}" for first, then in sorted(pairs) if then != TARGET]
+    rules = "\n".join(["digraph rules {", STYLE, *arrows, "}", ""])
+    PICTURE.write_text(output_of(["dot", "-Tsvg"], output_of(["tred"], rules)))
 
 
 if __name__ == "__main__":
-    sys.exit(exit_status.run(PROGRAM, main))
+    main()

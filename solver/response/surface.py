@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from carillon.errors import UserError
+from carillon.fem.finite_cells.cells import surface_points
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.finite_cells.surface import surface_points
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.faces import boundary_faces, surface_quads
 from carillon.fem.model import Solid

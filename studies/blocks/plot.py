@@ -9,7 +9,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from carillon.command_line.picture_formats import require_plottable
+from carillon.command_line.outputs import require_plottable
 from carillon.files.atomic import atomic_path
 from studies.base.colours import COLOURS, MUTED
 from studies.base.style import plain_numbers

@@ -12,7 +12,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.cover import cover_of
 from carillon.fem.finite_cells.covering import SMALLEST_PIECE, Covering, pieces
 from carillon.fem.finite_cells.inside import Inside, find_inside
-from carillon.fem.finite_cells.pieces import CUT, FULL
+from carillon.fem.finite_cells.lines import CUT, FULL
 from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index, Surface
 from carillon.fem.finite_cells.inside import Inside, find_inside
+from carillon.fem.finite_cells.lines import EMPTY, FULL, SKIPPED
 from carillon.fem.finite_cells.parts import Labels, find_parts, meetings, meetings_of_halves
-from carillon.fem.finite_cells.pieces import EMPTY, FULL, SKIPPED
 from carillon.fem.finite_cells.shapes import octant_weights
 from carillon.fem.finite_cells.weights import weights_of_parts
 from carillon.fem.geometry.grid import Grid

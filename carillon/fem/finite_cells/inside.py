@@ -14,10 +14,17 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Flags, Surface
 from carillon.fem.finite_cells.lines import (
+    CUT,
+    EMPTY,
+    FULL,
     LINES,
+    SKIPPED,
     Crossings,
+    Pieces,
     crossings,
     crossings_of_voxels,
+    joined,
+    points_on,
     spread_lines,
 )
 from carillon.fem.finite_cells.open_surfaces import (
@@ -25,7 +32,6 @@ from carillon.fem.finite_cells.open_surfaces import (
     encloses,
     pieces_of_open_surface,
 )
-from carillon.fem.finite_cells.pieces import CUT, EMPTY, FULL, SKIPPED, Pieces, joined, points_on
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.winding import Winding
 

@@ -12,8 +12,18 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
 from carillon.fem.element import CORNERS
-from carillon.fem.finite_cells.lines import LINES, Crossings, Lines
-from carillon.fem.finite_cells.pieces import CUT, EMPTY, FULL, SKIPPED, Pieces, joined, points_on
+from carillon.fem.finite_cells.lines import (
+    CUT,
+    EMPTY,
+    FULL,
+    LINES,
+    SKIPPED,
+    Crossings,
+    Lines,
+    Pieces,
+    joined,
+    points_on,
+)
 from carillon.fem.geometry.winding import INSIDE, Winding
 
 ENDS = 0.02
@@ -34,11 +44,8 @@ VAGUE = 127
 def classify(state: NDArray[np.int8], wind: Winding) -> NDArray[np.int8]:
     """Tell voxels inside from those outside where no line crosses the surface.
 
-    Returns
-    -------
-    NDArray[np.int8]
-        (nx, ny, nz) the winding number in the middle of each voxel, rounded; `VAGUE` where it is
-        far from whole somewhere in the voxel, as about holes.
+    Returns the winding number (nx, ny, nz) in the middle of each voxel, rounded; `VAGUE` where it
+    is far from whole somewhere in the voxel, as about holes.
     """
     shape = state.shape
     there = np.argwhere(state != SKIPPED)

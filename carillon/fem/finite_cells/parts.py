@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
 from carillon.fem.element import CORNERS
-from carillon.fem.finite_cells.lines import LINES
-from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
+from carillon.fem.finite_cells.lines import CUT, FULL, LINES, Pieces
 
 Labels = NDArray[np.int16]
 
@@ -34,7 +33,7 @@ def find_parts(
     cells : (k, 3)
         Lowest voxels of the cells.
     state : (k, 8)
-        States of their octants, see `carillon.fem.finite_cells.pieces`.
+        States of their octants, see `carillon.fem.finite_cells.lines`.
     pieces
         Of the lines along x, y and z.
 

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
 from carillon.fem.element import CORNERS
-from carillon.fem.finite_cells.lines import LINES, Spread
+from carillon.fem.finite_cells.lines import CUT, FULL, LINES, Pieces, Spread
 from carillon.fem.finite_cells.parts import Labels, box_bounds
-from carillon.fem.finite_cells.pieces import CUT, FULL, Pieces
 from carillon.fem.finite_cells.shapes import (
     OCTANTS,
     POINT_PLACES,

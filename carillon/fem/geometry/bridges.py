@@ -90,8 +90,7 @@ def _joints(filled: Flags, inside: Flags, axis: int) -> Index:
         before = points[x, y + j + 1, z + k + 1]
         for dj, dk in product((0, 1, 2), repeat=2):
             joined |= before & points[x + 1, y + j + dj, z + k + dk]
-    found = voxels[~joined]
-    return found[:, np.argsort([axis, *(other for other in range(3) if other != axis)])]
+    return voxels[~joined][:, np.argsort([axis, *(other for other in range(3) if other != axis)])]
 
 
 def _is_bridge(filled: Flags, inside: Flags, voxel: Index, axis: int) -> bool:

@@ -268,10 +268,7 @@ TRIALS = _named(
 def builtin_surface(name: str) -> trimesh.Trimesh:
     """Surface of the built-in object, thick or thin, or trial solid `name` in metres, closed.
 
-    Raises
-    ------
-    UserError
-        If there is no such object; the message lists the names.
+    Raises UserError if there is no such object; the message lists the names.
 
     Examples
     --------

@@ -37,14 +37,9 @@ def winding_fill(surface: Surface, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     would change the pieces, tunnels or cavities of the solid. Gaps narrower than a voxel close;
     pieces that hold less than half a voxel are left out.
 
-    Returns
-    -------
-    filled : (nx, ny, nz) bool
-        All False if its volume is not within a factor of `TOO_THIN` of the volume inside the
-        surface, or its length of the surface's: only a skeleton would be left of walls that thin,
-        and less of needles.
-    origin : (3,)
-        Corner of the grid [m].
+    Returns which are filled (nx, ny, nz), and the corner (3,) of the grid [m]. None is if their
+    volume is not within a factor of `TOO_THIN` of the volume inside the surface, or their length of
+    the surface's: only a skeleton would be left of walls that thin, and less of needles.
     """
     touched = touched_voxels(surface, grid)
     fraction = filled_fraction(SamplePoints(surface, grid, SAMPLES), touched)

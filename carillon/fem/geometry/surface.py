@@ -35,7 +35,13 @@ number: archives (zip, 3mf), parts that hold each other (3mf, dae), entities (xa
 
 
 def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
-    """Load a triangle surface in metres.
+    """Load a triangle surface [m], its faces turned alike; it need not be closed or manifold.
+
+    Raises UserError if the file is missing, not readable as a mesh, longer than `MESH_BYTES` with
+    those that it names, shorter than it says, without faces, flat, or holds coordinates that are
+    not finite; if its faces are there both ways, or cannot be turned alike; if `unit` is out of
+    range, or the surface too large, too small or too far from the origin (see `carillon.limits`);
+    if the built-in name is unknown.
 
     Parameters
     ----------
@@ -45,20 +51,6 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     unit
         Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
         them it is a scale factor.
-
-    Returns
-    -------
-    trimesh.Trimesh
-        Surface with vertices in metres, its faces turned alike. It need not be closed or manifold.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, not readable as a mesh, longer than `MESH_BYTES` with those that it
-        names, shorter than it says, without faces, flat,
-        or holds coordinates that are not finite; if its faces are there both ways, or cannot be
-        turned alike; if `unit` is out of range, or the surface too large, too small or too far
-        from the origin (see `carillon.limits`); if the built-in name is unknown.
 
     Examples
     --------

@@ -12,14 +12,11 @@ import numpy as np
 _POSITIONS = np.array(list(product((-1, 0, 1), repeat=3)))
 
 
-def _bits(positions: np.ndarray) -> int:
-    return sum(1 << int(bit) for bit in np.flatnonzero(positions))
-
-
 def _around(position: np.ndarray, steps: tuple[int, ...]) -> int:
     """Positions as many unit steps away, along different axes, as `steps` lists."""
     offset = np.abs(_POSITIONS - position)
-    return _bits((offset.max(axis=1) == 1) & np.isin(offset.sum(axis=1), steps))
+    there = (offset.max(axis=1) == 1) & np.isin(offset.sum(axis=1), steps)
+    return sum(1 << int(bit) for bit in np.flatnonzero(there))
 
 
 _CENTRE = np.zeros(3, dtype=int)
@@ -31,14 +28,9 @@ _BY_CORNER = tuple(_around(position, (1, 2, 3)) for position in _POSITIONS)
 
 
 def pieces(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Label the face-connected pieces of `filled`, largest first.
+    """Label the face-connected pieces of `filled`, largest first, and count their voxels.
 
-    Returns
-    -------
-    labels : (nx, ny, nz)
-        0 outside, 1 for the largest piece, and so on (ties: first in the grid).
-    sizes : (n_pieces,)
-        Voxels in each piece, descending.
+    Labels (nx, ny, nz) are 0 outside, 1 in the largest piece, and so on (ties: first in the grid).
     """
     from scipy import ndimage  # Its import takes long.
 
@@ -86,7 +78,7 @@ def _grown(seed: int, within: int, neighbours: tuple[int, ...]) -> int:
 
 
 def thin_to(cover: np.ndarray, keep: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """Remove voxels of `cover` outside `keep` as long as the topology of `cover` is unchanged.
+    """Remove voxels of `cover` outside `keep` as long as no piece, tunnel or cavity comes or goes.
 
     Parameters
     ----------
@@ -94,11 +86,6 @@ def thin_to(cover: np.ndarray, keep: np.ndarray, rank: np.ndarray) -> np.ndarray
         With `keep` inside `cover`.
     rank : (nx, ny, nz)
         Voxels of lowest rank go first; ties in grid order.
-
-    Returns
-    -------
-    (nx, ny, nz) bool
-        Set between `keep` and `cover` with the pieces, tunnels and cavities of `cover`.
     """
     shape = tuple(size + 2 for size in cover.shape)
     stride = np.array([shape[1] * shape[2], shape[2], 1])
