@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -41,6 +42,8 @@ def output_of(command: list[str], text: str = "", folder: str | None = None) -> 
 
 def main() -> None:
     """Draw the picture anew."""
+    if shutil.which("tred") is None:
+        sys.exit("no tred on PATH to draw the rules with; install Graphviz")
     snakemake = [sys.executable, "-m", "snakemake", "-s", str(settings.FOLDER / "Snakefile")]
     with tempfile.TemporaryDirectory() as folder:
         graph = output_of([*snakemake, "--rulegraph", "--cores", "1"], folder=folder)

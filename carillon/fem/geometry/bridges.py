@@ -43,13 +43,6 @@ def bridge(surface: Surface, voxels: VoxelModel) -> Array | None:
     """Middle (3,) [m] of a face across which voxels join what is apart; None if there is none.
 
     `surface`: triangles in metres, whose voxels they are.
-
-    Examples
-    --------
-    >>> from carillon.fem.geometry import builtin_surface, voxelize
-    >>> ring = builtin_surface("slit-ring")
-    >>> [bridge(ring, voxelize(ring, count)) is not None for count in (12, 32)]
-    [True, False]
     """
     filled, inside = voxels.filled, _inside(surface, voxels)
     if inside.sum() < LEAST_FULL * SAMPLES**3 * voxels.n_cells:

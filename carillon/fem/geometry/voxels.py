@@ -97,13 +97,6 @@ def voxelize(
         zero-frequency modes that the object does not have.
     name
         Name of the model.
-
-    Examples
-    --------
-    >>> from carillon.fem.geometry.builtin import builtin_surface
-    >>> voxels = voxelize(builtin_surface("box"), 8)
-    >>> max(voxels.shape), voxels.n_cells == voxels.filled.sum()
-    (8, True)
     """
     resolution = checked_resolution(surface, resolution, name)
     if fill not in FILLS:
