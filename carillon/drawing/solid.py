@@ -15,18 +15,14 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d import Axes3D
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-#: Colour of a body that shows no values.
 PLAIN = (0.90, 0.80, 0.64)
-
-#: Elevation and azimuth of the eye [degrees].
+"""Colour of a body that shows no values."""
 VIEW = (22.0, -58.0)
-
-#: Shares of the object's diagonal: the largest displacement that is drawn, and an arrow.
-DRAWN_AMPLITUDE = 0.08
-ARROW_LENGTH = 0.22
-
-#: Rings of neighbours over which normals are averaged to show the shape behind the voxels.
+"""Elevation and azimuth of the eye [degrees]."""
+DRAWN_AMPLITUDE, ARROW_LENGTH = 0.08, 0.22
+"""Shares of the object's diagonal: the largest displacement that is drawn, and an arrow."""
 SMOOTHING_RINGS = 4
+"""Rings of neighbours over which normals are averaged to show the shape behind the voxels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +113,16 @@ def draw(
     if skin is None:
         corners = corner_values(mesh, points, quads, cell)
         light = _light(corners, quads, view)
-        face_values = _on_faces(mesh, values, quads, cell)
     else:
         moved = 0.0 if displacement is None else skin.seen(motion)
         corners = ((skin.vertices + moved) @ turn.T)[skin.faces]
         light = _light_of_triangles(corners, view)
-        face_values = _on_skin(mesh, values, skin)
 
-    if face_values is None:
+    if values is None:
         colours = np.tile(PLAIN, (len(corners), 1))
     else:
+        of_faces = (quads, cell) if skin is None else (skin.faces, skin.cells)
+        face_values = _face_values(mesh, values, *of_faces, skin)
         low, high = limits or (float(face_values.min()), float(face_values.max()))
         mapping = ScalarMappable(Normalize(low, high if high > low else low + 1.0), cmap)
         colours = mapping.to_rgba(face_values)[:, :3]
@@ -136,7 +132,7 @@ def draw(
     edges = colours * 0.86 if skin is None else colours
     polygons = Poly3DCollection(corners, facecolors=colours, edgecolors=edges)
     polygons.set_linewidth(0.25)
-    if face_values is not None:
+    if values is not None:
         # Kept for a colour bar; the lit colours above stay as they are.
         polygons.set_norm(mapping.norm)
         polygons.set_cmap(cmap)
@@ -229,29 +225,22 @@ def _drawn_motion(mesh: HexMesh, displacement: np.ndarray | None, scale: float |
     return displacement * (DRAWN_AMPLITUDE * diagonal / largest if largest > 0 else 0.0)
 
 
-def _on_faces(
-    mesh: HexMesh, values: np.ndarray | None, quads: np.ndarray, cell: np.ndarray
-) -> np.ndarray | None:
-    if values is None:
-        return None
+def _face_values(
+    mesh: HexMesh,
+    values: np.ndarray,
+    faces: np.ndarray,
+    cells: np.ndarray | None,
+    skin: Skin | None,
+) -> np.ndarray:
     values = np.asarray(values, dtype=float)
     if values.shape == (mesh.n_nodes,):
-        return values[quads].mean(axis=1)
-    if values.shape == (mesh.n_cells,):
-        return values[cell]
+        return np.asarray((values if skin is None else skin.seen(values))[faces].mean(axis=1))
+    if values.shape == (mesh.n_cells,) and cells is not None:
+        return np.asarray(values[cells])
     raise ValueError(
         f"values have shape {values.shape}, expected ({mesh.n_nodes},) per node or "
         f"({mesh.n_cells},) per cell"
     )
-
-
-def _on_skin(mesh: HexMesh, values: np.ndarray | None, skin: Skin) -> np.ndarray | None:
-    if values is None:
-        return None
-    if len(values) == mesh.n_nodes:
-        return np.asarray(skin.seen(values)[skin.faces].mean(axis=1))
-    assert skin.cells is not None
-    return np.asarray(values[skin.cells])
 
 
 def _light_of_triangles(corners: np.ndarray, view: tuple[float, float]) -> np.ndarray:
@@ -289,13 +278,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _direction(elevation: float, azimuth: float) -> np.ndarray:
-    return np.array(
-        [
-            np.cos(elevation) * np.cos(azimuth),
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-        ]
-    )
+    across = np.cos(elevation)
+    return np.array([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)])
 
 
 def _frame(ax: Axes3D, points: np.ndarray, view: tuple[float, float]) -> None:

@@ -136,16 +136,8 @@ class ElasticModel(Solid):
 
     @property
     def elements(self) -> HexElements:
-        return HexElements(
-            self.young,
-            self.fill,
-            self.mesh.edge,
-            self.poisson,
-            self.density,
-            self.lumped,
-            self.lumped_share,
-            self.mesh.kinds,
-        )
+        constants = self.poisson, self.density, self.lumped, self.lumped_share
+        return HexElements(self.young, self.fill, self.mesh.edge, *constants, self.mesh.kinds)
 
     @property
     def connectivity(self) -> NDArray[np.int32]:

@@ -115,16 +115,9 @@ def _parameter(each: dataclasses.Field[Any], annotation: Any) -> Parameter:
     domain = domain_of(annotation)
     meaning = metadata.get("help") or domain.meaning
     domain = replace(domain, meaning=meaning)
-    return Parameter(
-        each.name,
-        REQUIRED if default is dataclasses.MISSING else default,
-        domain,
-        meaning,
-        annotation,
-        metadata.get("metavar"),
-        metadata.get("read"),
-        metadata.get("several", False),
-    )
+    metavar, read = metadata.get("metavar"), metadata.get("read")
+    several = metadata.get("several", False)
+    return Parameter(each.name, default, domain, meaning, annotation, metavar, read, several)
 
 
 def domain_of(annotation: Any) -> ValueDomain:

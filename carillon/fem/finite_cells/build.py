@@ -135,17 +135,13 @@ def _lost(surface: Surface, inside: Inside, resolution: int, grid: Grid, name: s
     if inside.sheet:
         return nothing
     better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
-    if better:
-        return (
-            f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, "
-            f"which are lost between its lines; raise --resolution to {better}"
-        )
-    if any(len(each.low) for each in inside.pieces):
-        return (
-            f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which "
-            "are lost between its lines; raise --resolution or make them thicker"
-        )
-    return nothing
+    if not better and not any(len(each.low) for each in inside.pieces):
+        return nothing
+    remedy = f"to {better}" if better else "or make them thicker"
+    return (
+        f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which are "
+        f"lost between its lines; raise --resolution {remedy}"
+    )
 
 
 def _in_pieces(surface: Surface, volumes: np.ndarray, resolution: int, name: str) -> str:

@@ -122,15 +122,10 @@ class FiniteCellModel(Solid):
     @cached_property
     def elements(self) -> CellElements:
         # Made once, since the weights of all cells go into them.
-        return CellElements(
-            self.cells.point_values(self.young),
-            self.cells.point_values(np.ones(self.mesh.n_cells)),
-            self.mesh.edge,
-            self.poisson,
-            self.density,
-            self.cells.span if self.cells.is_mixed else None,
-            self.cells.kinds,
-        )
+        young, share = map(self.cells.point_values, (self.young, np.ones(self.mesh.n_cells)))
+        constants = self.mesh.edge, self.poisson, self.density
+        span = self.cells.span if self.cells.is_mixed else None
+        return CellElements(young, share, *constants, span, self.cells.kinds)
 
     @property
     def connectivity(self) -> NDArray[np.int32]:

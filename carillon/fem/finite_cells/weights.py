@@ -50,20 +50,10 @@ def weights_of_parts(
     weights, lines = np.zeros((count, OCTANTS, POINTS)), np.zeros(count, dtype=np.int64)
     for each, bounds in zip(pieces, box_bounds(pieces)):
         chosen = (state == CUT) & (facing == each.axis)
-        _integrate(
-            cells,
-            chosen,
-            each.axis,
-            labels,
-            first,
-            (each.start, each.low, each.high, each.columns),
-            _across(each.across[0]),
-            _across(each.across[1]),
-            bounds,
-            POINT_PLACES,
-            weights,
-            lines,
-        )
+        of_cells = cells, chosen, each.axis, labels, first
+        along = each.start, each.low, each.high, each.columns
+        rows, columns = map(_across, each.across)
+        _integrate(*of_cells, along, rows, columns, bounds, POINT_PLACES, weights, lines)
     cell, octant = np.nonzero(state == FULL)
     part = labels[cell, *(LINES * CORNERS[octant]).T].astype(np.int64)
     weights[first[cell] + part - 1, octant] = octant_weights()[octant]
