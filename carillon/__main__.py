@@ -14,10 +14,7 @@ from importlib import import_module
 from carillon import ROOMS
 from carillon.command_line.commands import Command, run_program
 
-LONGER = {
-    "dataset_gen": {"inspect": "inspect-shard"},
-    "forests": {"inspect": "inspect-forests"},
-}
+LONGER = {"dataset_gen": {"inspect": "inspect-shard"}, "forests": {"inspect": "inspect-forests"}}
 """Names of commands of a room that another room has too."""
 STUDY = "study"
 

@@ -23,13 +23,8 @@ def require_plottable(path: str | Path) -> Path:
 def require_outputs(arguments: argparse.Namespace, inputs: Sequence[str | Path] = ()) -> None:
     """Check that results can be written, and not in the place of what they are made from.
 
-    Parameters
-    ----------
-    arguments
-        With `out`, `plot`, `pictures`, some or none of them: names of files, None if none is to be
-        written.
-    inputs
-        Names of the files that are read.
+    `arguments` has `out`, `plot`, `pictures`, some or none of them: names of files, None if none is
+    to be written. `inputs` are names of the files that are read.
 
     Raises
     ------

@@ -26,8 +26,6 @@ class Elements(ABC):
         Moduli [Pa] at the points of each element, which its stiffness is linear in.
     edge
         Spacing of the lattice that the nodes lie on [m].
-    poisson
-        Poisson's ratio.
     """
 
     young: Array

@@ -107,15 +107,11 @@ class ElasticModel(Solid):
 
     Parameters
     ----------
-    mesh
-        Nodes and cells.
     young : (m, 8)
         Young's modulus [Pa] at each cell's quadrature points, taken as it is: what users
         give goes through `fine_model` and `with_young`.
     fill : (m,)
         Bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine mesh.
-    poisson
-        Poisson's ratio.
     density
         Mass density of the filled octants [kg/m^3].
     lumped

@@ -74,14 +74,8 @@ def read_marked(path: str | Path, what: str) -> tuple[dict[str, Any], yaml.Node]
     """The keys and values of a YAML file, and its nodes, of which `line_of` tells lines.
 
     Raises UserError if the file is missing, no file, too large, no YAML, nested too deeply, holds
-    references or a key twice, or no keys and values.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    what
-        What the file should be, for messages: "a project".
+    references or a key twice, or no keys and values. `what`: what the file should be, for messages:
+    "a project".
     """
     path = Path(path)
     try:

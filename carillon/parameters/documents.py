@@ -29,8 +29,6 @@ def read_parameters(path: str | Path, model: type[T], what: str) -> T:
 
     Parameters
     ----------
-    path
-        Of the file.
     model
         Dataclass of parameters that it describes.
     what

@@ -9,12 +9,7 @@ from carillon.parameters.fields import ValueDomain, parameters_of
 from carillon.parameters.model import REQUIRED
 
 _TYPES = {int: "integer", float: "number", str: "string", bool: "boolean", tuple: "array"}
-_LIMITS = {
-    "ge": "minimum",
-    "gt": "exclusiveMinimum",
-    "le": "maximum",
-    "lt": "exclusiveMaximum",
-}
+_LIMITS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
 
 
 def schema_of(model: type, meaning: str = "") -> dict[str, Any]:

@@ -16,12 +16,8 @@ def measured(
 ) -> dict[str, Any]:
     """Provenance of a measurement made just now: plain values, ready for JSON or HDF5.
 
-    Parameters
-    ----------
-    ranks
-        MPI ranks, or several numbers of them that were measured one after the other.
-    threads
-        Of each rank; what the process may use if None.
+    `ranks` may be several numbers of MPI ranks that were measured one after the other; `threads`,
+    of each rank, are what the process may use if None.
     """
     from carillon.numerics.simd_width import LANES  # whose import takes half a second
 

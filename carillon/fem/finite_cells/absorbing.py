@@ -39,14 +39,8 @@ def taken_in(
 ) -> tuple[Index, Array]:
     """Rows (p,) of the parts and the weights (k, 8, 125) with what hosts have taken in.
 
-    Parameters
-    ----------
-    corner, span : (p, 3), (p,)
-        Lowest corners and edges of the parts' cells.
-    host
-        See `hosts`.
-    row, weights
-        See `carillon.fem.finite_cells.cells.FiniteCells`.
+    `corner` (p, 3) and `span` (p,) are lowest corners and edges of the cells; see `hosts`, and
+    of `row` and `weights` `carillon.fem.finite_cells.cells.FiniteCells`.
     """
     guests = np.flatnonzero((host >= 0) & (host != np.arange(len(host))))
     if not len(guests):

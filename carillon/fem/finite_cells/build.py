@@ -82,8 +82,6 @@ def finite_cells(
         that edge, and a node every spacing.
     components
         ``"error"`` rejects a solid in several pieces, ``"largest"`` keeps the largest.
-    name
-        Name of the solid, for messages.
     grid
         Lattice of about this resolution around the solid, with an even number of voxels along each
         axis; `even_grid` if None.

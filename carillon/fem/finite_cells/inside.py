@@ -27,11 +27,7 @@ from carillon.fem.finite_cells.lines import (
     points_on,
     spread_lines,
 )
-from carillon.fem.finite_cells.open_surfaces import (
-    classify,
-    encloses,
-    pieces_of_open_surface,
-)
+from carillon.fem.finite_cells.open_surfaces import classify, encloses, pieces_of_open_surface
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.winding import Winding
 

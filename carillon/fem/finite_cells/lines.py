@@ -128,11 +128,8 @@ class Crossings(Lines):
 
     Attributes
     ----------
-    place : (k,)
-        Ascending on each line, in lattice units.
-    step : (k,) int8
-        Change of the winding number there: 1 where the line enters a closed surface, -1 where it
-        leaves.
+    place, step : (k,)
+        See `line_crossings`, in lattice units.
     """
 
     place: Array
@@ -140,16 +137,9 @@ class Crossings(Lines):
 
 
 def crossings(vertices: Array, faces: Index, spreads: Sequence[Spread], axis: int) -> Crossings:
-    """Crossings of the lines along an axis through a lattice of voxels.
+    """Crossings of the lines along an axis through a lattice of voxels, see `line_crossings`.
 
-    Parameters
-    ----------
-    vertices : (v, 3)
-        In lattice units.
-    faces : (f, 3)
-        Triangles; two that meet have the same vertices there.
-    spreads
-        Of the lines across x, y and z.
+    Vertices are in lattice units, `spreads` of the lines across x, y and z.
     """
     across = spreads[(axis + 1) % 3], spreads[(axis + 2) % 3]
     rows, columns = (each.coordinates for each in across)

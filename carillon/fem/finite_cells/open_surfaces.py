@@ -68,11 +68,7 @@ def classify(state: NDArray[np.int8], wind: Winding) -> NDArray[np.int8]:
 
 
 def pieces_of_open_surface(
-    lines: Crossings,
-    state: NDArray[np.int8],
-    levels: NDArray[np.int8],
-    wind: Winding,
-    ends: bool,
+    lines: Crossings, state: NDArray[np.int8], levels: NDArray[np.int8], wind: Winding, ends: bool
 ) -> Pieces:
     """Pieces of lines inside, of states and levels (nx, ny, nz) as `classify` has them.
 

@@ -68,12 +68,7 @@ def meetings(lower: Index, upper: Index, labels: Labels, axis: int) -> Index:
 
 
 def meetings_of_halves(
-    whole: Index,
-    half: Index,
-    quarter: Index,
-    labels: tuple[Labels, Labels],
-    axis: int,
-    side: int,
+    whole: Index, half: Index, quarter: Index, labels: tuple[Labels, Labels], axis: int, side: int
 ) -> Index:
     """Parts that meet at faces of cells with cells of half the edge: rows (pair, part, its part).
 

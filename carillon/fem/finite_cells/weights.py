@@ -10,13 +10,7 @@ from carillon.arrays import Array, Index
 from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.lines import CUT, FULL, LINES, Pieces, Spread
 from carillon.fem.finite_cells.parts import Labels, box_bounds
-from carillon.fem.finite_cells.shapes import (
-    OCTANTS,
-    POINT_PLACES,
-    POINTS,
-    lagrange,
-    octant_weights,
-)
+from carillon.fem.finite_cells.shapes import OCTANTS, POINT_PLACES, POINTS, lagrange, octant_weights
 
 
 def weights_of_parts(
@@ -32,20 +26,9 @@ def weights_of_parts(
 
     With them comes on how many pieces of lines (count,) those of a part rest.
 
-    An octant is integrated along the axis that the surface faces there.
-
-    Parameters
-    ----------
-    cells : (k, 3)
-        Lowest voxels of the cells.
-    state, facing : (k, 8)
-        Of their octants, see `carillon.fem.finite_cells.inside.Inside`.
-    pieces
-        Of the lines along x, y and z.
-    labels
-        See `carillon.fem.finite_cells.parts.find_parts`.
-    first : (k,)
-        Number of each cell's first part.
+    An octant is integrated along the axis that the surface faces there. `cells` (k, 3), `state`
+    (k, 8), `pieces` and `labels` are as in `carillon.fem.finite_cells.parts.find_parts`, `facing`
+    (k, 8) as in `carillon.fem.finite_cells.inside.Inside`; `first` (k,) is each cell's first part.
     """
     weights, lines = np.zeros((count, OCTANTS, POINTS)), np.zeros(count, dtype=np.int64)
     for each, bounds in zip(pieces, box_bounds(pieces)):

@@ -4,12 +4,7 @@ from typing import TYPE_CHECKING
 
 from carillon import lazy_exports
 from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
-from carillon.fem.geometry.blocks import (
-    Blocks,
-    blocks_from_mesh,
-    blocks_with_coarse,
-    prolongation,
-)
+from carillon.fem.geometry.blocks import Blocks, blocks_from_mesh, blocks_with_coarse, prolongation
 from carillon.fem.geometry.hexmesh import (
     CORNER_OFFSETS,
     HexMesh,

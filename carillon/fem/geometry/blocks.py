@@ -26,8 +26,6 @@ class Blocks:
 
     Attributes
     ----------
-    fine
-        The fine mesh.
     coarse
         Mesh of the elements, edge twice the fine one, the same origin; a mixed mesh if some blocks
         are divided. Elements of one block, and nodes of one place, follow each other.

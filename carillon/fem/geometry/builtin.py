@@ -137,8 +137,7 @@ def rin() -> trimesh.Trimesh:
     angle = np.linspace(0.0, np.pi / 2, 25)
     across, up = np.sin(angle) ** 0.8, 1 - np.cos(angle)
     return turned(
-        [*0.0600 * across, *(0.0575 * across)[::-1]],
-        [*0.0700 * up, *(0.0025 + 0.0675 * up)[::-1]],
+        [*0.0600 * across, *(0.0575 * across)[::-1]], [*0.0700 * up, *(0.0025 + 0.0675 * up)[::-1]]
     )
 
 

@@ -39,13 +39,6 @@ def one_body(surface: Surface, components: str, name: str) -> Surface:
 
     A body that touches itself along edges is warned of. Raises UserError if there are such bodies
     and `components` is ``"error"``.
-
-    Parameters
-    ----------
-    components
-        ``"largest"`` leaves the others out.
-    name
-        Of the mesh, for messages.
     """
     facets = Facets.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), sheets=True)
     kept = _without_others(surface, facets, components, name)

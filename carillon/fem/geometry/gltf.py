@@ -70,12 +70,7 @@ ReadBeside = Callable[[str, int | None], bytes]
 def plain_gltf(content: bytes, beside: ReadBeside, name: str) -> bytes:
     """A GLB with the triangles of a glTF file, text or binary.
 
-    Parameters
-    ----------
-    beside
-        Reads as many bytes of a file in the mesh's folder.
-    name
-        Of the mesh, for messages.
+    `beside`: reads as many bytes of a file in the mesh's folder.
 
     Raises
     ------

@@ -24,8 +24,6 @@ class Parts:
 
     Attributes
     ----------
-    fine
-        The fine mesh.
     position, part : (m,)
         Position of each cell in its block, and its part.
     owner : (parts,)

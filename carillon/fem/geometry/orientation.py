@@ -39,13 +39,7 @@ def turned_alike(vertices: Array, faces: Index, name: str) -> Index | None:
     turned as the others are, unless they are cavities of them. Of faces that are there both ways
     one stays. Everything is as it was, None, if no face has to be turned. Raises UserError if all
     faces of the surface, or of a closed part, are there both ways, or faces cannot be turned alike.
-
-    Parameters
-    ----------
-    vertices : (v, 3)
-        In any unit; those at one place are one.
-    name
-        Of the mesh, for messages.
+    `vertices` (v, 3): in any unit; those at one place are one.
     """
     facets = Facets.of_surface(vertices, faces)
     if not len(facets):

@@ -56,12 +56,8 @@ def parts_of(facets: Facets, sign: Index, balance: Index) -> tuple[Index, Flags]
     A patch that is closed by itself is a part, whatever it touches; others are by the edges that
     they share.
 
-    Parameters
-    ----------
-    sign : (t,)
-        1 for triangles as they are, -1 for those to be turned, 0 for those that do not count.
-    balance : (e,)
-        See `Facets.unbalanced`.
+    `sign` (t,) is 1 for triangles as they are, -1 for those to be turned, 0 for those that do not
+    count; `balance` (e,) is that of `Facets.unbalanced`.
     """
     patch = facets.patches
     edge, way, counts = facets.edges

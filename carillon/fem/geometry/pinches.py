@@ -86,16 +86,8 @@ def _solids(
 ) -> Index:
     """How many solids (e,) round each edge have no sector of it in common.
 
-    Parameters
-    ----------
-    sign : (t,)
-        Of the triangles; 0 for those that do not count.
-    edge, angle : (s,)
-        Edge of each triangle at one, and its angle round it, in order.
-    step : (s,)
-        By which the winding number rises across the triangle.
-    probe : (e, 3, 3)
-        Middle of each edge, and arms from there at the angle zero and at a right one.
+    Triangles are in order: `edge` (s,), `angle` (s,) and `step` (s,), by which the winding number
+    rises. `probe` (e, 3, 3) is each edge's middle, and arms at the angle zero and at a right one.
     """
     count = len(edge)
     first = np.flatnonzero(np.diff(edge, prepend=-1))

@@ -95,8 +95,6 @@ def voxelize(
         ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps the
         largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
         zero-frequency modes that the object does not have.
-    name
-        Name of the model.
     """
     resolution = checked_resolution(surface, resolution, name)
     if fill not in FILLS:
