@@ -103,14 +103,6 @@ def keep_apart(environment: MutableMapping[str, str], process: int) -> None:
 
     A directory that the user has chosen stays. Others are in a folder for temporary files that can
     be written, or else in the present one, under a name that nobody can guess and take before.
-
-    Examples
-    --------
-    >>> environment = {"TMPDIR": "/dev"}
-    >>> keep_apart(environment, 17)
-    >>> directory = environment["OMPI_MCA_orte_top_session_dir"]
-    >>> "/carillon-mpi." in directory, directory.split(".")[-2]
-    (True, '17')
     """
     if _launched(environment) or not _is_own(environment.get(_DIRECTORY, _OWN)):
         return

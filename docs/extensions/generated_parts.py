@@ -8,7 +8,6 @@ from typing import Any
 
 import command_help
 import gallery
-import materials_table
 import rooms_picture
 import schema_keys
 from sphinx.application import Sphinx
@@ -21,7 +20,7 @@ PARTS: dict[str, Callable[..., str]] = {
     "project": schema_keys.of_project,
     "scene": schema_keys.of_scene,
     "examples": gallery.of_examples,
-    "materials": materials_table.of_materials,
+    "materials": schema_keys.of_materials,
 }
 _PLACE = re.compile(r"^<!-- made here: (.+) -->$", re.MULTILINE)
 

@@ -1,12 +1,18 @@
-"""Keys of the configuration, of projects and of scenes as lists, from their models."""
+"""Keys of the configuration, of projects and of scenes as lists; their materials as a table."""
 
 from __future__ import annotations
 
 import parameter_tables
 
 from sound.project.project import Project
+from sound.scenes.materials import MATERIALS, named_material
 from sound.scenes.scene import Scene
 from workflow.configuration.whole import limits, whole
+
+_HEAD = (
+    "| name | E [GPa] | ν | density [kg/m³] | α [1/s] | β [s] | bounce | friction "
+    "| roughness [µm] | source |"
+)
 
 
 def of_configuration() -> str:
@@ -31,3 +37,22 @@ def of_project() -> str:
 def of_scene() -> str:
     """Sections with the keys of a scene."""
     return parameter_tables.sections(Scene, "The scene")
+
+
+def of_materials() -> str:
+    """A line for each material."""
+    rows = [_HEAD, "| --- |" + " ---: |" * 8 + " --- |"]
+    for name in MATERIALS:
+        each = named_material(name)
+        numbers = [
+            f"{each.young / 1e9:.3g}",
+            f"{each.poisson:.3g}",
+            f"{each.density:.4g}",
+            f"{each.alpha:.3g}",
+            f"{each.beta:.2g}",
+            f"{each.restitution:.2g}",
+            f"{each.friction:.2g}",
+            f"{1e6 * each.roughness:.2g}",
+        ]
+        rows.append(f"| {name} | {' | '.join(numbers)} | {each.about}. {each.source} |")
+    return "\n".join(rows) + "\n"

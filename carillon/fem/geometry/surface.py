@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
+from trimesh.resolvers import FilePathResolver
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
-from carillon.fem.geometry.beside import Beside, NoFiles
 from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.orientation import turned_alike
@@ -207,3 +207,50 @@ def _require_solid(mesh: str, surface: trimesh.Trimesh, unit: float) -> None:
             f"{mesh}: lies {away:g} from the origin and its longest side is {longest:g}, too far "
             "to tell voxels apart; move it to the origin"
         )
+
+
+class Beside:
+    """Regular files in the folder of a mesh, together with it no longer than a mesh may be."""
+
+    def __init__(self, mesh: Path) -> None:
+        self._mesh = mesh
+        self._folder = FilePathResolver(str(mesh))
+        self._read = mesh.stat().st_size
+
+    def get(self, name: str, length: int | None) -> bytes:
+        """The first `length` bytes of the file `name`, all of them if that is None.
+
+        Raises UserError if they are too many, which is seen before they are read, and ValueError if
+        there is no such file in the folder, or it is shorter.
+        """
+        path = self._found(name)
+        size = path.stat().st_size
+        length = size if length is None else length
+        if not 0 <= length <= size:
+            raise ValueError(f"the file {name!r} has {size:,} bytes, the mesh says {length:,}")
+        if self._read + length > MESH_BYTES:
+            raise UserError(
+                f"{self._mesh}: is {self._read + length:,} bytes with the file {name!r} that it "
+                f"names, expected at most {MESH_BYTES:,}; simplify the mesh"
+            )
+        self._read += length
+        with open(path, "rb") as stream:
+            return stream.read(length)
+
+    def _found(self, name: str) -> Path:
+        for candidate in (name.strip(), name.strip().lstrip("/"), Path(name).name):
+            try:
+                path = self._folder.absolute(candidate)
+            except ValueError:  # it lies elsewhere
+                continue
+            if path.is_file():
+                return path
+        raise ValueError(f"no file {name!r} beside it")
+
+
+class NoFiles(FilePathResolver):  # type: ignore[misc]
+    """A folder in which trimesh finds no file beside a mesh: a shape has no need of materials."""
+
+    def get(self, name: str) -> Any:
+        """Raise FileNotFoundError, which trimesh takes for a file that is not there."""
+        raise FileNotFoundError(name)
