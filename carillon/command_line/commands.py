@@ -24,26 +24,18 @@ from carillon.processes.waiting import leave_cores
 
 @dataclass(frozen=True)
 class Command:
-    """A command and where it is found.
-
-    Attributes
-    ----------
-    module
-        Has `add_arguments(parser)` and `run(arguments)`, which returns an exit status or None for
-        success; its docstring is the command's description, `EXAMPLES` ends its help.
-    summary
-        What it does, for the list of commands.
-    ranks
-        Whether it may be started on several MPI ranks.
-    room, in_room
-        Of a study's command: the room that lists it, too, and its name there if that is another.
-    """
+    """A command and where it is found."""
 
     module: str
+    """Has `add_arguments(parser)` and `run(arguments)`, which returns an exit status or None for
+    success; its docstring is the command's description, `EXAMPLES` ends its help."""
     summary: str
+    """What it does, for the list of commands."""
     ranks: bool = False
+    """Whether it may be started on several MPI ranks."""
     room: str = ""
     in_room: str = ""
+    """Of a study's command: the room that lists it, too, and its name there if that is another."""
 
 
 def run_room(room: str, description: str, words: Sequence[str] | None = None) -> int:

@@ -27,24 +27,16 @@ SMOOTHING_RINGS = 4
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Triangles that are drawn in the place of a mesh's own faces.
-
-    Attributes
-    ----------
-    vertices : (v, 3)
-        Positions [m].
-    faces : (f, 3)
-        Triangles, wound either way.
-    weights : (v, n)
-        Interpolation from the nodes; None if nothing moves.
-    cells : (f,)
-        The cell that each triangle belongs to; None if cells have no values.
-    """
+    """Triangles that are drawn in the place of a mesh's own faces."""
 
     vertices: np.ndarray
+    """(v, 3) positions [m]."""
     faces: np.ndarray
+    """(f, 3) triangles, wound either way."""
     weights: sp.csr_matrix | None = None
+    """(v, n) interpolation from the nodes; None if nothing moves."""
     cells: np.ndarray | None = None
+    """(f,) the cell that each triangle belongs to; None if cells have no values."""
 
     def seen(self, nodal: np.ndarray) -> np.ndarray:
         """Values (v, k) at the vertices, from those (n, k) of the nodes."""

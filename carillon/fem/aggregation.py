@@ -35,25 +35,17 @@ CYCLE = np.float32
 
 @dataclass(frozen=True)
 class Level:
-    """A graph whose vertices are one or several cells.
-
-    Attributes
-    ----------
-    laplacian
-        (m, m) with the number of faces that two vertices share as the weight of their edge.
-    grid
-        (m, 3) integer coordinates of the vertices, in edges of this level.
-    sizes
-        (m,) number of cells of each vertex.
-    sums
-        (finer, m) matrix whose rows tell the vertex of each of the next finer graph; the identity
-        on the finest.
-    """
+    """A graph whose vertices are one or several cells."""
 
     laplacian: sp.csr_matrix
+    """(m, m) with the number of faces that two vertices share as the weight of their edge."""
     grid: NDArray[np.int32]
+    """(m, 3) integer coordinates of the vertices, in edges of this level."""
     sizes: Array
+    """(m,) number of cells of each vertex."""
     sums: sp.csr_matrix
+    """(finer, m) matrix whose rows tell the vertex of each of the next finer graph; the identity on
+    the finest."""
 
     def __len__(self) -> int:
         return len(self.sizes)

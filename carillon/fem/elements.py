@@ -18,18 +18,12 @@ Chosen = NDArray[np.integer] | Flags | slice
 
 
 class Elements(ABC):
-    """Elements of one kind, all of whose arrays have a row for each.
-
-    Attributes
-    ----------
-    young : (c, p)
-        Moduli [Pa] at the points of each element, which its stiffness is linear in.
-    edge
-        Spacing of the lattice that the nodes lie on [m].
-    """
+    """Elements of one kind, all of whose arrays have a row for each."""
 
     young: Array
+    """(c, p) moduli [Pa] at the points of each element, which its stiffness is linear in."""
     edge: float
+    """Spacing of the lattice that the nodes lie on [m]."""
     poisson: float
 
     @property
@@ -82,24 +76,19 @@ class Elements(ABC):
 
 @dataclass(frozen=True)
 class HexElements(Elements):
-    """Cubic elements with material, wherever their nodes may be; see `ElasticModel`.
-
-    Attributes
-    ----------
-    edge
-        Edge of an element [m], of the smaller ones in a mixed mesh.
-    kinds : (c,) int32
-        Of the elements of a mixed mesh, see `carillon.fem.geometry.hanging`; else None.
-    """
+    """Cubic elements with material, wherever their nodes may be; see `ElasticModel`."""
 
     young: Array
     fill: NDArray[np.uint8]
     edge: float
+    """Edge of an element [m], of the smaller ones in a mixed mesh."""
     poisson: float
     density: float
     lumped: bool
     lumped_share: float
     kinds: NDArray[np.int32] | None = None
+    """(c,) int32: kinds of the elements of a mixed mesh, see `carillon.fem.geometry.hanging`; else
+    None."""
 
     def of(self, *arrays: NDArray[Any]) -> Self:
         young, fill, *kinds = arrays

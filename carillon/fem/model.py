@@ -25,22 +25,15 @@ DEFAULT_DENSITY = 1000.0
 
 
 class Solid(ABC):
-    """A solid with material in one discretisation.
-
-    Attributes
-    ----------
-    mesh
-        Voxels that carry the material, or the elements that replace them, and all nodes.
-    young
-        Young's moduli [Pa] that belong to them.
-    poisson, density
-        Poisson's ratio and mass density [kg/m^3].
-    """
+    """A solid with material in one discretisation."""
 
     mesh: HexMesh
+    """Voxels that carry the material, or the elements that replace them, and all nodes."""
     young: Array
+    """Young's moduli [Pa] that belong to them."""
     poisson: float
     density: float
+    """Poisson's ratio and mass density [kg/m^3]."""
 
     @property
     def n_dofs(self) -> int:
@@ -103,32 +96,24 @@ class Solid(ABC):
 
 @dataclass(frozen=True)
 class ElasticModel(Solid):
-    """A hexahedral mesh with material, an element for each of its cells.
-
-    Parameters
-    ----------
-    young : (m, 8)
-        Young's modulus [Pa] at each cell's quadrature points, taken as it is: what users
-        give goes through `fine_model` and `with_young`.
-    fill : (m,)
-        Bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine mesh.
-    density
-        Mass density of the filled octants [kg/m^3].
-    lumped
-        Whether the mass is row-sum lumped (diagonal) instead of consistent.
-    lumped_share
-        Share of lumped in the mass of cells whose octants are all filled; the rest is consistent.
-        A mixture disperses less than either (`dataset_gen.objectives.lumped_share`). In a mixed
-        mesh the mass of fine cells has none.
-    """
+    """A hexahedral mesh with material, an element for each of its cells."""
 
     mesh: HexMesh
     young: Array
+    """(m, 8) Young's modulus [Pa] at each cell's quadrature points, taken as it is: what users give
+    goes through `fine_model` and `with_young`."""
     fill: NDArray[np.uint8]
+    """(m,) bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine
+    mesh."""
     poisson: float = DEFAULT_POISSON
     density: float = DEFAULT_DENSITY
+    """Mass density of the filled octants [kg/m^3]."""
     lumped: bool = False
+    """Whether the mass is row-sum lumped (diagonal) instead of consistent."""
     lumped_share: float = 0.0
+    """Share of lumped in the mass of cells whose octants are all filled; the rest is consistent. A
+    mixture disperses less than either (`dataset_gen.objectives.lumped_share`). In a mixed mesh the
+    mass of fine cells has none."""
 
     @property
     def elements(self) -> HexElements:

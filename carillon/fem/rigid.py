@@ -12,24 +12,16 @@ from carillon.fem.model import Solid
 
 @dataclass(frozen=True)
 class MassProperties:
-    """A solid as a rigid body.
-
-    Attributes
-    ----------
-    mass : float [kg]
-        Of the whole solid.
-    centre : (3,) [m]
-        Centre of mass.
-    moments : (3,) [kg m^2]
-        Principal moments of inertia about it, ascending.
-    axes : (3, 3)
-        Rotation whose columns are the principal axes.
-    """
+    """A solid as a rigid body."""
 
     mass: float
+    """Mass of the whole solid [kg]."""
     centre: Array
+    """(3,) centre of mass [m]."""
     moments: Array
+    """(3,) principal moments of inertia about it [kg m^2], ascending."""
     axes: Array
+    """(3, 3) rotation whose columns are the principal axes."""
 
 
 def mass_properties(model: Solid) -> MassProperties:

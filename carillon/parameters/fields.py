@@ -17,42 +17,28 @@ _LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 
 @dataclass(frozen=True)
 class ValueDomain:
-    """The values that an annotation admits.
-
-    Attributes
-    ----------
-    kind
-        int, float, str, bool, tuple, dict, or a dataclass; str if a check makes it of a text.
-    meaning
-        What they are, with the unit in brackets; empty if the annotation does not say.
-    limits
-        By the names of `annotated_types`: ge, gt, le, lt, min_length, max_length.
-    choices
-        Texts that are admitted, if not all are.
-    words
-        Texts that are admitted in place of a value of this kind, such as auto.
-    nullable
-        Whether None is admitted.
-    items
-        Domains of the items of a tuple, or of the values of a dict.
-    endless
-        Whether a tuple has any number of the one item.
-    is_union
-        Whether pydantic names the kind that it tried in the places of mistakes.
-    annotation
-        What was read; without None.
-    """
+    """The values that an annotation admits."""
 
     kind: Any
+    """int, float, str, bool, tuple, dict, or a dataclass; str if a check makes it of a text."""
     meaning: str = ""
+    """What they are, with the unit in brackets; empty if the annotation does not say."""
     limits: Mapping[str, float] = field(default_factory=dict)
+    """By the names of `annotated_types`: ge, gt, le, lt, min_length, max_length."""
     choices: tuple[str, ...] = ()
+    """Texts that are admitted, if not all are."""
     words: tuple[str, ...] = ()
+    """Texts that are admitted in place of a value of this kind, such as auto."""
     nullable: bool = False
+    """Whether None is admitted."""
     items: tuple[ValueDomain, ...] = ()
+    """Domains of the items of a tuple, or of the values of a dict."""
     endless: bool = False
+    """Whether a tuple has any number of the one item."""
     is_union: bool = False
+    """Whether pydantic names the kind that it tried in the places of mistakes."""
     annotation: Any = None
+    """What was read; without None."""
 
     @property
     def is_section(self) -> bool:

@@ -48,15 +48,10 @@ def configure(environment: MutableMapping[str, str]) -> None:
 
 
 class Locator:
-    """What numba asks for a kernel's place, instead of its own list of such classes.
-
-    Attributes
-    ----------
-    folder
-        Within the private one, once it is used.
-    """
+    """What numba asks for a kernel's place, instead of its own list of such classes."""
 
     folder: Path | None = None
+    """Within the private one, once it is used."""
 
     @classmethod
     def from_function(cls, function: Any, source: str) -> Any:

@@ -31,27 +31,19 @@ class FiniteCells:
     Some cells may be divided into eight of half the edge, which the steps of the lattice then are
     half of; see `carillon.fem.finite_cells.hanging` for their nodes. Each of these lies in one
     voxel.
-
-    Attributes
-    ----------
-    nodes : (c, 27) int32
-        Nodes of each cell, in the order of `carillon.fem.block.NODES`.
-    voxels : (c, 8) int32
-        Voxel of each octant, in bit order; -1 where it is empty.
-    row : (c,) int32
-        Row of `weights` of each cell.
-    weights : (k, 8, 125)
-        Integrals of the points' Lagrange polynomials over the inside of each octant, for a cell of
-        volume one; row 0 is that of a cell all inside.
-    mesh
-        The voxels that hold material, ordered by (z, y, x), and all nodes.
     """
 
     nodes: np.ndarray
+    """(c, 27) int32: nodes of each cell, in the order of `carillon.fem.block.NODES`."""
     voxels: np.ndarray
+    """(c, 8) int32: voxel of each octant, in bit order; -1 where it is empty."""
     row: np.ndarray
+    """(c,) int32: row of `weights` of each cell."""
     weights: np.ndarray
+    """(k, 8, 125) integrals of the points' Lagrange polynomials over the inside of each octant, for
+    a cell of volume one; row 0 is that of a cell all inside."""
     mesh: HexMesh
+    """The voxels that hold material, ordered by (z, y, x), and all nodes."""
 
     def __len__(self) -> int:
         return len(self.nodes)

@@ -23,40 +23,27 @@ FEWEST_LINES = 24
 
 @dataclass(frozen=True)
 class LatticeCover:
-    """Cells of one lattice that hold anything, and their parts that touch nowhere in them.
-
-    Attributes
-    ----------
-    places : (c, 3)
-        Lowest voxel of each cell.
-    cut : (c,)
-        Row of `labels` of each cell; -1 if it is all inside.
-    labels : (k, boxes, boxes, boxes)
-        Part of each box, see `carillon.fem.finite_cells.parts`.
-    first : (c,)
-        Number of each cell's first part, before those that hold nothing are left out.
-    number : (q,)
-        Number of each such part among those that are left, -1 of the others.
-    owner : (p,)
-        Cell of each part.
-    row, weights
-        See `carillon.fem.finite_cells.cells.FiniteCells`.
-    met : (m, 3)
-        Parts that meet, the lower one first, and the axis across their face.
-    slight : (p,)
-        Parts that are no cells of their own, see `carillon.fem.finite_cells.absorbing`.
-    """
+    """Cells of one lattice that hold anything, and their parts that touch nowhere in them."""
 
     places: Index
+    """(c, 3) lowest voxel of each cell."""
     cut: Index
+    """(c,) row of `labels` of each cell; -1 if it is all inside."""
     labels: Labels
+    """(k, boxes, boxes, boxes) part of each box, see `carillon.fem.finite_cells.parts`."""
     first: Index
+    """(c,) number of each cell's first part, before those that hold nothing are left out."""
     number: Index
+    """(q,) number of each such part among those that are left, -1 of the others."""
     owner: Index
+    """(p,) cell of each part."""
     row: Index
     weights: Array
+    """See `carillon.fem.finite_cells.cells.FiniteCells`."""
     met: Index
+    """(m, 3) parts that meet, the lower one first, and the axis across their face."""
     slight: Flags
+    """(p,) parts that are no cells of their own, see `carillon.fem.finite_cells.absorbing`."""
 
     def __len__(self) -> int:
         return len(self.row)

@@ -22,44 +22,29 @@ SMALLEST_PIECE = 0.5
 
 @dataclass(frozen=True)
 class Division:
-    """Finite cells some of which are divided into eight.
-
-    Attributes
-    ----------
-    cells
-        The mesh.
-    parent : (c,)
-        Undivided cell that each is, or is part of.
-    voxel : (m,)
-        Voxel of the undivided mesh whose material each voxel has.
-    """
+    """Finite cells some of which are divided into eight."""
 
     cells: FiniteCells
+    """The mesh."""
     parent: Index
+    """(c,) undivided cell that each is, or is part of."""
     voxel: Index
+    """(m,) voxel of the undivided mesh whose material each voxel has."""
 
 
 @dataclass(frozen=True)
 class Covering:
-    """A surface, and the cells of a lattice that cover its inside.
-
-    Attributes
-    ----------
-    surface, name
-        See `finite_cells`.
-    grid
-        Lattice of the voxels.
-    cover
-        The cells and their parts.
-    kept : (p,)
-        Which parts are of the solid.
-    """
+    """A surface, and the cells of a lattice that cover its inside."""
 
     surface: Surface
     name: str
+    """See `finite_cells`."""
     grid: Grid
+    """Lattice of the voxels."""
     cover: LatticeCover
+    """The cells and their parts."""
     kept: Flags
+    """(p,) which parts are of the solid."""
 
     @cached_property
     def cells(self) -> FiniteCells:
@@ -110,27 +95,20 @@ class Covering:
 
 @dataclass(frozen=True)
 class CellParts:
-    """Parts of the cells of one lattice or two, all of whose arrays have a row for each.
-
-    Attributes
-    ----------
-    corner, span : (p, 3), (p,)
-        Lowest corners and edges of their cells, in steps: voxels, or halves of them.
-    row, volumes, slight : (p,)
-        See `LatticeCover`; volumes are in voxels.
-    weights
-        That the rows are of.
-    faces
-        Where they meet.
-    """
+    """Parts of the cells of one lattice or two, all of whose arrays have a row for each."""
 
     corner: Index
     span: Index
+    """(p, 3), (p,): lowest corners and edges of their cells, in steps: voxels, or halves of
+    them."""
     row: Index
     volumes: Array
     slight: Flags
+    """(p,) see `LatticeCover`; volumes are in voxels."""
     weights: Array
+    """That the rows are of."""
     faces: Faces
+    """Where they meet."""
 
     @classmethod
     def of_cover(cls, cover: LatticeCover) -> CellParts:

@@ -34,24 +34,17 @@ from carillon.fem.geometry.winding import Winding
 
 @dataclass(frozen=True)
 class Inside:
-    """The inside of a surface on a lattice.
-
-    Attributes
-    ----------
-    state : (nx, ny, nz) int8
-        `EMPTY`, `CUT`, `FULL` or `SKIPPED`.
-    facing : (nx, ny, nz) int8
-        Axis whose lines the surface crosses most often in a voxel, as it does face on.
-    pieces
-        Of the lines along x, y and z.
-    sheet
-        Whether the surface is open and goes around nothing.
-    """
+    """The inside of a surface on a lattice."""
 
     state: NDArray[np.int8]
+    """(nx, ny, nz) int8: `EMPTY`, `CUT`, `FULL` or `SKIPPED`."""
     facing: NDArray[np.int8]
+    """(nx, ny, nz) int8: axis whose lines the surface crosses most often in a voxel, as it does
+    face on."""
     pieces: tuple[Pieces, Pieces, Pieces]
+    """Of the lines along x, y and z."""
     sheet: bool = False
+    """Whether the surface is open and goes around nothing."""
 
     def volumes(self) -> tuple[float, float]:
         """Volume [voxels] in the voxels that are cut, by one half of the lines and by the other."""

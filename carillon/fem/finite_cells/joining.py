@@ -17,19 +17,13 @@ _STRIDE = np.array([1, 3, 9])
 
 @dataclass(frozen=True)
 class Faces:
-    """Cells that meet across faces.
-
-    Attributes
-    ----------
-    alike : (m, 3)
-        Two cells of one size, the lower one first, and the axis across the face.
-    unlike : (k, 4)
-        A cell, one of half its edge, the axis, and on which side of that axis the latter's face is:
-        0 or 2.
-    """
+    """Cells that meet across faces."""
 
     alike: Index
+    """(m, 3) two cells of one size, the lower one first, and the axis across the face."""
     unlike: Index
+    """(k, 4) a cell, one of half its edge, the axis, and on which side of that axis the latter's
+    face is: 0 or 2."""
 
     def chosen(self, kept: Flags) -> Faces:
         """Those between cells that are kept, by their new numbers."""

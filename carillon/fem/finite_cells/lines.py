@@ -33,21 +33,14 @@ MOST_PLANES = 2
 
 @dataclass(frozen=True)
 class Spread:
-    """Places of the lines on the edges of the voxels along one axis.
-
-    Attributes
-    ----------
-    places : (n, LINES)
-        In each voxel, from 0 to 1.
-    shares : (n, LINES)
-        Their weights, of sum one.
-    bounds : (n, LINES - 1)
-        Bounds between the pieces of an edge that the lines stand for.
-    """
+    """Places of the lines on the edges of the voxels along one axis."""
 
     places: Array
+    """(n, LINES) in each voxel, from 0 to 1."""
     shares: Array
+    """(n, LINES) their weights, of sum one."""
     bounds: Array
+    """(n, LINES - 1) bounds between the pieces of an edge that the lines stand for."""
 
     @property
     def coordinates(self) -> Array:
@@ -100,21 +93,14 @@ def _points_between(ends: tuple[float, ...]) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Lines:
-    """Numbered places on the lines along one axis.
-
-    Attributes
-    ----------
-    axis
-        That the lines run along; across it are b = axis + 1 and c = axis + 2, modulo 3.
-    across
-        Spread of the lines across b and c: line (i, j) has the number ``i * columns + j``.
-    start : (lines + 1,)
-        Range of each line's entries.
-    """
+    """Numbered places on the lines along one axis."""
 
     axis: int
+    """That the lines run along; across it are b = axis + 1 and c = axis + 2, modulo 3."""
     across: tuple[Spread, Spread]
+    """Spread of the lines across b and c: line (i, j) has the number ``i * columns + j``."""
     start: Index
+    """(lines + 1,) range of each line's entries."""
 
     @property
     def columns(self) -> int:
@@ -124,16 +110,11 @@ class Lines:
 
 @dataclass(frozen=True)
 class Crossings(Lines):
-    """Crossings with the triangles of a surface.
-
-    Attributes
-    ----------
-    place, step : (k,)
-        See `line_crossings`, in lattice units.
-    """
+    """Crossings with the triangles of a surface."""
 
     place: Array
     step: NDArray[np.int8]
+    """(k,) see `line_crossings`, in lattice units."""
 
 
 def crossings(vertices: Array, faces: Index, spreads: Sequence[Spread], axis: int) -> Crossings:
@@ -168,16 +149,11 @@ TOUCHING = 1e-9
 
 @dataclass(frozen=True)
 class Pieces(Lines):
-    """Pieces of the lines along one axis that are inside.
-
-    Attributes
-    ----------
-    low, high : (k,)
-        Their ends in lattice units, ascending on each line.
-    """
+    """Pieces of the lines along one axis that are inside."""
 
     low: Array
     high: Array
+    """(k,) their ends in lattice units, ascending on each line."""
 
 
 def joined(lines: Lines, line: Index, low: Array, high: Array) -> Pieces:

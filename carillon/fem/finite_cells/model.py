@@ -23,29 +23,20 @@ from carillon.fem.moduli import require_moduli
 
 @dataclass(frozen=True)
 class CellElements(Elements):
-    """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside.
-
-    Attributes
-    ----------
-    young : (c, 125)
-        Moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`.
-    share : (c, 125)
-        The same of the density over that of the solid.
-    edge
-        Step of the lattice [m].
-    poisson, density
-        See `Solid`.
-    span, kinds : (c,)
-        See `FiniteCells`, of cells of two sizes; else None.
-    """
+    """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside."""
 
     young: Array
+    """(c, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`."""
     share: Array
+    """(c, 125) the same of the density over that of the solid."""
     edge: float
+    """Step of the lattice [m]."""
     poisson: float
     density: float
+    """See `Solid`."""
     span: NDArray[np.int32] | None = None
     kinds: Index | None = None
+    """(c,) see `FiniteCells`, of cells of two sizes; else None."""
 
     def of(self, *arrays: NDArray[Any]) -> Self:
         young, share, *sizes = arrays
@@ -97,23 +88,16 @@ class CellElements(Elements):
 
 @dataclass(frozen=True)
 class FiniteCellModel(Solid):
-    """Finite cells with a modulus for every voxel that holds material.
-
-    Parameters
-    ----------
-    cells
-        The mesh.
-    young : (m,)
-        Young's modulus [Pa] of each voxel, taken as it is: what users give goes through
-        `finite_cell_model` and `with_young`.
-    poisson, density
-        See `Solid`.
-    """
+    """Finite cells with a modulus for every voxel that holds material."""
 
     cells: FiniteCells
+    """The mesh."""
     young: Array
+    """(m,) Young's modulus [Pa] of each voxel, taken as it is: what users give goes through
+    `finite_cell_model` and `with_young`."""
     poisson: float = DEFAULT_POISSON
     density: float = DEFAULT_DENSITY
+    """See `Solid`."""
 
     @property
     def mesh(self) -> HexMesh:  # type: ignore[override]

@@ -22,24 +22,18 @@ from carillon.fem.geometry.joining import Parts, coarse_mesh, corner_weights
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """The coarse mesh over a fine one: an element for each part of a block that holds material.
-
-    Attributes
-    ----------
-    coarse
-        Mesh of the elements, edge twice the fine one, the same origin; a mixed mesh if some blocks
-        are divided. Elements of one block, and nodes of one place, follow each other.
-    fine_of_block : (mc, 8) int32
-        Index of the fine cell at position ``x + 2*y + 4*z`` of an element, -1 where it holds none.
-    contacts : (mc,) uint8
-        Bit d tells whether the element meets another one at face d of `faces.FACE_CORNERS`: a face
-        of its fine cells is one of the other's.
-    """
+    """The coarse mesh over a fine one: an element for each part of a block that holds material."""
 
     fine: HexMesh
     coarse: HexMesh
+    """Mesh of the elements, edge twice the fine one, the same origin; a mixed mesh if some blocks
+    are divided. Elements of one block, and nodes of one place, follow each other."""
     fine_of_block: np.ndarray
+    """(mc, 8) int32: index of the fine cell at position ``x + 2*y + 4*z`` of an element, -1 where
+    it holds none."""
     contacts: np.ndarray
+    """(mc,) uint8: bit d tells whether the element meets another one at face d of
+    `faces.FACE_CORNERS`: a face of its fine cells is one of the other's."""
 
     @property
     def mask(self) -> np.ndarray:

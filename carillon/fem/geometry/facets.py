@@ -16,27 +16,18 @@ DIGITS = 7
 
 @dataclass(frozen=True)
 class Facets:
-    """Distinct triangles of a surface whose vertices are numbered by their places.
-
-    Attributes
-    ----------
-    vertices : (v, 3)
-        Over the longest side of the surface, from its lowest corner.
-    triangles : (t, 3)
-        Distinct ones, turned as the first face that each stands for.
-    of_face : (f,)
-        Triangle of each face; -1 of faces without an area.
-    along : (f,)
-        1 for faces that are turned as their triangle, -1 for others.
-    sheet : (t,)
-        Sheet of each triangle. Triangles of two sheets are not one, and share no edges.
-    """
+    """Distinct triangles of a surface whose vertices are numbered by their places."""
 
     vertices: Array
+    """(v, 3) over the longest side of the surface, from its lowest corner."""
     triangles: Index
+    """(t, 3) distinct ones, turned as the first face that each stands for."""
     of_face: Index
+    """(f,) triangle of each face; -1 of faces without an area."""
     along: Index
+    """(f,) 1 for faces that are turned as their triangle, -1 for others."""
     sheet: Index
+    """(t,) sheet of each triangle. Triangles of two sheets are not one, and share no edges."""
 
     @classmethod
     def of_surface(cls, vertices: Array, faces: Index, sheets: bool = False) -> Facets:

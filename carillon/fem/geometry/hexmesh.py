@@ -20,33 +20,24 @@ class HexMesh:
 
     In a mixed mesh, see `carillon.fem.geometry.blocks`, some cubes have twice the edge and start at
     even coordinates, and the others may have hanging corners, see `carillon.fem.geometry.hanging`.
-
-    Attributes
-    ----------
-    cells : (m, 8) int32
-        Node indices of each cell; local corner ``c`` has the offset
-        ``(c & 1, c >> 1 & 1, c >> 2 & 1)``, so x runs fastest.
-    grid : (m, 3) int32
-        Integer coordinates of the cells, ordered by (z, y, x); in a mixed mesh by blocks.
-    node_grid : (n, 3) int32
-        Integer coordinates of the nodes, ordered by (z, y, x).
-    origin : (3,)
-        Position of node coordinate (0, 0, 0) [m].
-    edge
-        Edge of a cell [m], of the smaller ones in a mixed mesh.
-    span : (m,) uint8
-        Edge of each cell in steps of the grid, 1 or 2; None in a mesh of one edge length.
-    hanging : (m,) uint8
-        Bit c tells whether local corner c hangs; None likewise.
     """
 
     cells: np.ndarray
+    """(m, 8) int32: nodes of each cell; the bits of a local corner are its offset, x first."""
     grid: np.ndarray
+    """(m, 3) int32: integer coordinates of the cells, ordered by (z, y, x); in a mixed mesh by
+    blocks."""
     node_grid: np.ndarray
+    """(n, 3) int32: integer coordinates of the nodes, ordered by (z, y, x)."""
     origin: np.ndarray
+    """(3,) position of node coordinate (0, 0, 0) [m]."""
     edge: float
+    """Edge of a cell [m], of the smaller ones in a mixed mesh."""
     span: np.ndarray | None = None
+    """(m,) uint8: edge of each cell in steps of the grid, 1 or 2; None in a mesh of one edge
+    length."""
     hanging: np.ndarray | None = None
+    """(m,) uint8: bit c tells whether local corner c hangs; None likewise."""
 
     @cached_property
     def nodes(self) -> np.ndarray:

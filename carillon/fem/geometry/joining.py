@@ -20,23 +20,16 @@ def corner_weights() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Parts:
-    """The parts of the blocks over a fine mesh.
-
-    Attributes
-    ----------
-    position, part : (m,)
-        Position of each cell in its block, and its part.
-    owner : (parts,)
-        Block of each part.
-    grid : (blocks, 3)
-        Integer coordinates of the blocks.
-    """
+    """The parts of the blocks over a fine mesh."""
 
     fine: HexMesh
     position: np.ndarray
     part: np.ndarray
+    """(m,) position of each cell in its block, and its part."""
     owner: np.ndarray
+    """(parts,) block of each part."""
     grid: np.ndarray
+    """(blocks, 3) integer coordinates of the blocks."""
 
 
 def coarse_mesh(

@@ -15,23 +15,16 @@ EXACT = 20_000_000
 
 @dataclass(frozen=True)
 class ClosedPart:
-    """What of a surface is closed by itself.
-
-    Attributes
-    ----------
-    triangles
-        Its triangles (k,).
-    volume
-        Positive if turned as the most of the surface's parts, negative of cavities; of a surface
-        whose longest side is one.
-    low, high : (3,)
-        Corners of the box around it.
-    """
+    """What of a surface is closed by itself."""
 
     triangles: Index
+    """Its triangles (k,)."""
     volume: float
+    """Positive if turned as the most of the surface's parts, negative of cavities; of a surface
+    whose longest side is one."""
     low: Array
     high: Array
+    """(3,) corners of the box around it."""
 
 
 def closed_parts(facets: Facets) -> list[ClosedPart]:

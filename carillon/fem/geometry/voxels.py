@@ -27,27 +27,18 @@ and the largest grid [voxels] that such a trial may have."""
 
 @dataclass(frozen=True, eq=False)
 class VoxelModel:
-    """Filled cubes of one edge length on a grid with an even number of cells along each axis.
-
-    Attributes
-    ----------
-    filled : (nx, ny, nz) bool
-        With even nx, ny, nz, so that 2x2x2 blocks start at index 0.
-    origin : (3,)
-        Corner of the grid with the lowest coordinates [m].
-    edge
-        Edge of a voxel [m].
-    name
-        Name of the model for messages and files.
-    resolution
-        Voxels along the longest side of the surface's bounding box.
-    """
+    """Filled cubes of one edge length on a grid with an even number of cells along each axis."""
 
     filled: np.ndarray
+    """(nx, ny, nz) bool: with even nx, ny, nz, so that 2x2x2 blocks start at index 0."""
     origin: np.ndarray
+    """(3,) corner of the grid with the lowest coordinates [m]."""
     edge: float
+    """Edge of a voxel [m]."""
     name: str
+    """Name of the model for messages and files."""
     resolution: int
+    """Voxels along the longest side of the surface's bounding box."""
 
     @property
     def shape(self) -> tuple[int, int, int]:
