@@ -9,8 +9,7 @@ import pytest
 import trimesh
 
 from carillon.fem.materials import young_modulus
-from carillon.fem.model import fine_model
-from carillon.fem.rigid import mass_properties
+from carillon.fem.model import fine_model, mass_properties
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes

@@ -83,8 +83,7 @@ def _oriented(surface: trimesh.Trimesh) -> trimesh.Trimesh:
 
 def _in_closed_part(oriented: trimesh.Trimesh) -> NDArray[np.bool_]:
     """Whether all triangles at each vertex (v,) belong to closed parts that face outwards."""
-    from carillon.fem.geometry.facets import Facets
-    from carillon.fem.geometry.parts import parts_of, signed_volumes
+    from carillon.fem.geometry.facets import Facets, parts_of, signed_volumes
 
     faces = np.asarray(oriented.faces)
     facets = Facets.of_surface(np.asarray(oriented.vertices), faces)

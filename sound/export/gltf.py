@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import __version__
-from carillon.fem.rigid import mass_properties
+from carillon.fem.model import mass_properties
 from sound.export.gltf_buffer import (
     FLOAT,
     TRIANGLES,

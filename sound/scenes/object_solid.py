@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry.size import doubt_unit
-from carillon.fem.model import Solid
-from carillon.fem.rigid import MassProperties, mass_properties
+from carillon.fem.model import MassProperties, Solid, mass_properties
 from carillon.files.hdf5 import kind_of
 from carillon.limits import EXTENTS
 from solver.files.modes_file import read_modes, require_same_solid

@@ -29,6 +29,10 @@ EDGES = 1e-6
 """Distance [voxels] from the lattice up to which a crossing is of its outermost voxels."""
 MOST_PLANES = 2
 """Planes that split an edge at most, those with most area."""
+EMPTY, CUT, FULL, SKIPPED = 0, 1, 2, 3
+"""States of a voxel; skipped are those that nobody asked for."""
+TOUCHING = 1e-9
+"""Gap [voxels] between two pieces that are one."""
 
 
 @dataclass(frozen=True)
@@ -139,12 +143,6 @@ def crossings_of_voxels(lines: Crossings, shape: tuple[int, int, int]) -> NDArra
     index[axis], index[(axis + 1) % 3], index[(axis + 2) % 3] = place, row // LINES, column // LINES
     flat = np.ravel_multi_index(tuple(index), shape)
     return np.bincount(flat, minlength=int(np.prod(shape))).reshape(shape).astype(np.int32)
-
-
-EMPTY, CUT, FULL, SKIPPED = 0, 1, 2, 3
-"""States of a voxel; skipped are those that nobody asked for."""
-TOUCHING = 1e-9
-"""Gap [voxels] between two pieces that are one."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,13 @@ from carillon.arrays import Array, Index, Surface
 from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from carillon.fem.geometry.crossings import line_crossings
-from carillon.fem.geometry.facets import Facets, connected
-from carillon.fem.geometry.parts import ClosedPart, closed_parts, winding_numbers
+from carillon.fem.geometry.facets import (
+    ClosedPart,
+    Facets,
+    closed_parts,
+    connected,
+    winding_numbers,
+)
 from carillon.fem.geometry.pinches import MOST_EDGES, pinches
 
 TOUCHING = 1e-7

@@ -11,8 +11,13 @@ import numpy as np
 from carillon.arrays import Array, Flags, Index
 from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
-from carillon.fem.geometry.facets import Facets, connected
-from carillon.fem.geometry.parts import parts_of, signed_volumes, winding_numbers
+from carillon.fem.geometry.facets import (
+    Facets,
+    connected,
+    parts_of,
+    signed_volumes,
+    winding_numbers,
+)
 
 INSIDE = 0.5
 """Winding number of another part about a point from which on the point is in it."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from carillon.arrays import Array, Index
-from carillon.fem.geometry.facets import Facets, connected
-from carillon.fem.geometry.parts import winding_numbers
+from carillon.fem.geometry.facets import Facets, connected, winding_numbers
 
 COINCIDENT = 1e-6
 """Angle [rad] around an edge within which two triangles lie on each other."""
