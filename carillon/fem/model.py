@@ -73,7 +73,7 @@ class Solid(ABC):
 
     @abstractmethod
     def with_young(self, young: Array) -> Self:
-        """The same solid with other moduli [Pa], likewise."""
+        """The same solid with other moduli [Pa], see `element_moduli`."""
 
     def with_constants(self, poisson: float, density: float) -> Self:
         """The same solid with another Poisson's ratio and mass density [kg/m^3]."""

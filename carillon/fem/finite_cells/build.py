@@ -37,7 +37,16 @@ def covering(
     name: str = "mesh",
     grid: Grid | None = None,
 ) -> Covering:
-    """The cells of a lattice that cover the inside of a surface; see `finite_cells`."""
+    """The cells of a lattice that cover the inside of a surface; see `finite_cells`.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry.builtin import builtin_surface
+    >>> cover = covering(builtin_surface("bell"), 12)
+    >>> division = cover.divided(cover.cells.grid[:3])
+    >>> len(division.cells) > len(cover.cells)
+    True
+    """
     resolution = checked_resolution(surface, resolution, name)
     if components not in COMPONENTS:
         raise UserError(
@@ -85,6 +94,13 @@ def finite_cells(
     grid
         Lattice of about this resolution around the solid, with an even number of voxels along each
         axis; `even_grid` if None.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry.builtin import builtin_surface
+    >>> cells = finite_cells(builtin_surface("bell"), 12)
+    >>> bool(abs(cells.volume / 8.79e-4 - 1.0) < 0.01), len(cells) > 90
+    (True, True)
     """
     return covering(surface, resolution, components, name, grid).cells
 

@@ -268,6 +268,11 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
     """Surface of the built-in object, thick or thin, or trial solid `name` in metres, closed.
 
     Raises UserError if there is no such object; the message lists the names.
+
+    Examples
+    --------
+    >>> builtin_surface("bar").is_watertight
+    True
     """
     known = {**BUILTINS, **THIN, **TRIALS}
     if name not in known:

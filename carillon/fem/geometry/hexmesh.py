@@ -120,5 +120,13 @@ def distinct_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def hexmesh_from_voxels(voxels: VoxelModel) -> HexMesh:
-    """Mesh of the filled voxels, with nodes only where a filled voxel has a corner."""
+    """Mesh of the filled voxels, with nodes only where a filled voxel has a corner.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry import builtin_surface, voxelize
+    >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("box"), 8))
+    >>> mesh.n_dofs == 3 * mesh.n_nodes, mesh.cells.shape == (mesh.n_cells, 8)
+    (True, True)
+    """
     return hexmesh_from_grid(np.argwhere(voxels.filled), voxels.origin, voxels.edge)

@@ -51,6 +51,12 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     unit
         Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
         them it is a scale factor.
+
+    Examples
+    --------
+    >>> surface = load_surface("builtin:bell", unit=2.0)
+    >>> bool((surface.extents > load_surface("builtin:bell").extents).all())
+    True
     """
     if not UNITS[0] <= unit <= UNITS[1]:
         raise UserError(

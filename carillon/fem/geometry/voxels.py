@@ -86,6 +86,13 @@ def voxelize(
         ``"error"`` rejects a model of several face-connected pieces, ``"largest"`` keeps the
         largest. Cubes that share but an edge or a corner would be joined by a hinge, which adds
         zero-frequency modes that the object does not have.
+
+    Examples
+    --------
+    >>> from carillon.fem.geometry.builtin import builtin_surface
+    >>> voxels = voxelize(builtin_surface("box"), 8)
+    >>> max(voxels.shape), voxels.n_cells == voxels.filled.sum()
+    (8, True)
     """
     resolution = checked_resolution(surface, resolution, name)
     if fill not in FILLS:
