@@ -1,9 +1,39 @@
-"""The rules: they lint, and the default run is planned as promised."""
+"""The rules: they lint, and runs are planned as promised, quickly, and without MPI.
+
+Traces of MPI in the environment would reach every job.
+"""
+
+import re
+from subprocess import CompletedProcess
 
 import pytest
 
 from tests.programs import python
 from tests.workflow_runs import CHECKOUT, PROFILE
+
+_IMPORT = re.compile(r"(?m)^(?:from (?:carillon|workflow)|import (?:carillon|workflow))\b.*$")
+
+
+@pytest.fixture
+def printed(dry_run, tmp_path):
+    """What is printed of a dry run of a configuration with its commands."""
+
+    def run(config: str, *targets: str) -> CompletedProcess[str]:
+        path = tmp_path / "config.yaml"
+        path.write_text(config)
+        done = dry_run(tmp_path, *targets, "-p", "--cores", 2, "--configfile", path)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done
+
+    return run
+
+
+def test_rules_import_neither_mpi_nor_petsc():
+    files = [CHECKOUT / "Snakefile", *(CHECKOUT / "workflow" / "rules").glob("*.smk")]
+    imports = [line for file in files for line in _IMPORT.findall(file.read_text())]
+    check = "import sys; print(sorted({'mpi4py.MPI', 'petsc4py', 'slepc4py'} & set(sys.modules)))"
+    done = python("-c", "\n".join([*imports, check]), cwd=CHECKOUT)
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr
 
 
 def test_default_run_is_planned_without_a_gap(plan):
@@ -34,15 +64,13 @@ def test_a_bad_value_on_the_command_line_stops_the_run_with_a_sentence(dry_run, 
     assert "Traceback" not in output
 
 
-def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(dry_run, tmp_path):
-    config = tmp_path / "config.yaml"
-    config.write_text(
+def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(printed):
+    config = (
         "models:\n"
         "  bar: {mesh: 'builtin:bar', resolution: 16}\n"
         "  bell: {mesh: 'builtin:bell', resolution: 16, discretisation: finite-cell}\n"
     )
-    done = dry_run(tmp_path, "validation", "-p", "--cores", 2, "--configfile", config)
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = printed(config, "validation")
     runs = [line.split() for line in done.stdout.splitlines() if "-m solver modes" in line]
     telling = {run[run.index("--out") + 1] for run in runs if "--no-estimate" not in run}
     assert telling == {f"results/models/{model}/hcms_ec.h5" for model in ("bar", "bell")}
@@ -51,15 +79,27 @@ def test_one_variant_of_a_model_tells_its_distance_and_all_have_one_mesh(dry_run
     assert undivided == ["builtin:bell" in run for run in runs] and sum(undivided) == 3
 
 
+MODELS = "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_ranks_get_a_launcher_only_where_there_are_several(dry_run, tmp_path, ranks):
-    config = tmp_path / "config.yaml"
-    config.write_text(
-        "models: {bar: {mesh: 'builtin:bar', resolution: 16}}\n"
-        f"solver: {{ranks: {ranks}, modes: 20}}\n"
-    )
-    target = "results/models/bar/truth.h5"
-    done = dry_run(tmp_path, target, "-p", "--cores", 2, "--configfile", config)
-    output = done.stdout + done.stderr
-    assert done.returncode == 0, output
-    assert ("mpiexec -n 2 python" in output) == (ranks == 2)
+def test_ranks_get_a_launcher_only_where_there_are_several(printed, ranks):
+    config = f"{MODELS}solver: {{ranks: {ranks}, modes: 20}}\n"
+    done = printed(config, "results/models/bar/truth.h5")
+    assert ("mpiexec -n 2 python" in done.stdout + done.stderr) == (ranks == 2)
+
+
+@pytest.mark.parametrize(
+    ("dataset", "distribution", "expected"),
+    [
+        ("{}", "uniform", "--distribution uniform --workers 1 --out"),
+        (
+            "{distributions: [log-uniform], ranges: {log-uniform: [0.1, 50]}, workers: 2}",
+            "log-uniform",
+            "--distribution log-uniform --low 0.1 --high 50 --workers 2 --out",
+        ),
+    ],
+)
+def test_moduli_and_workers_of_shards_reach_the_command(printed, dataset, distribution, expected):
+    done = printed(f"{MODELS}dataset: {dataset}\n", f"results/dataset/{distribution}-0.h5")
+    assert expected in done.stdout + done.stderr
