@@ -52,13 +52,6 @@ SAMPLE_RATE = 44_100
 class Mesh:
     """The surface of a solid, in metres.
 
-    Attributes
-    ----------
-    surface : trimesh.Trimesh
-        Its triangles, turned alike.
-    name
-        For messages and files.
-
     Examples
     --------
     >>> bar = ca.load_mesh("builtin:bar")
@@ -67,7 +60,9 @@ class Mesh:
     """
 
     surface: trimesh.Trimesh
+    """Its triangles, turned alike."""
     name: str = "mesh"
+    """For messages and files."""
 
     @classmethod
     def of_triangles(cls, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Self:
@@ -118,19 +113,6 @@ def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
 class Material:
     """Material of a solid: its moduli, Poisson's ratio and density.
 
-    Attributes
-    ----------
-    young : float, str, (m,) or (m, 8) array, or function
-        Young's modulus [Pa]: one; the name of a field (`uniform`, `smooth`, `two-region`, `random`,
-        `noise`) or a file of moduli; one for each voxel, or for each of their quadrature points; or
-        a function of the voxels' centres (m, 3) [m] that returns (m,).
-    poisson, density
-        Poisson's ratio and mass density [kg/m^3].
-    damping
-        Rayleigh's coefficients of mass [1/s] and of stiffness [s], for `render`.
-    seed
-        Of the fields that are drawn.
-
     Examples
     --------
     >>> stiffer_above = ca.Material(lambda centres: 1e9 * (1.0 + centres[:, 2]))
@@ -139,10 +121,17 @@ class Material:
     """
 
     young: Young = 1e9
+    """Young's modulus [Pa]: one; the name of a field (`uniform`, `smooth`, `two-region`, `random`,
+    `noise`) or a file of moduli; one for each voxel (m,), or for each of their quadrature points
+    (m, 8); or a function of the voxels' centres (m, 3) [m] that returns (m,)."""
     poisson: float = DEFAULT_POISSON
+    """Poisson's ratio."""
     density: float = DEFAULT_DENSITY
+    """Mass density [kg/m^3]."""
     damping: tuple[float, float] = DAMPING
+    """Rayleigh's coefficients of mass [1/s] and of stiffness [s], for `render`."""
     seed: int = 0
+    """Seed of the fields that are drawn."""
 
     @classmethod
     def named(cls, name: str) -> Self:
@@ -178,28 +167,20 @@ Body = Mesh | HexMesh | Solid | str | Path
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Modes of a solid.
-
-    Attributes
-    ----------
-    eigenvalues, frequencies : (k,)
-        [rad^2/s^2] and [Hz], ascending; the first six are those of rigid motions.
-    residuals : (k,)
-        `|K x - lambda M x| / (lambda |M x|)`.
-    shapes : (k, n, 3)
-        Displacements of the nodes, mass-normalised [kg^-1/2]; None on other ranks than 0.
-    solid
-        The solid, with the material that was solved; None on other ranks than 0.
-    evidence
-        What the solver did and achieved.
-    """
+    """Modes of a solid."""
 
     eigenvalues: Array
+    """(k,) [rad^2/s^2], ascending; the first six are those of rigid motions."""
     frequencies: Array
+    """(k,) [Hz], likewise."""
     residuals: Array
+    """(k,) `|K x - lambda M x| / (lambda |M x|)`."""
     shapes: Array | None
+    """(k, n, 3) mass-normalised displacements of nodes [kg^-1/2]; None on other ranks than 0."""
     solid: Solid | None
+    """The solid, with the material that was solved; None on other ranks than 0."""
     evidence: dict[str, Any] = field(default_factory=dict)
+    """What the solver did and achieved."""
 
     @property
     def mesh(self) -> HexMesh:
@@ -562,15 +543,10 @@ def extract(
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A material that lets struck points of a solid sound as clips do.
-
-    Attributes
-    ----------
-    found
-        All that its file holds.
-    """
+    """A material that lets struck points of a solid sound as clips do."""
 
     found: FoundDesign
+    """All that its file holds."""
 
     @property
     def frequencies(self) -> Array:
@@ -658,13 +634,6 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
 class Forests:
     """Regression forests that coarsen 2x2x2 blocks of voxels.
 
-    Attributes
-    ----------
-    path
-        Their file.
-    model
-        All that it holds.
-
     Examples
     --------
     >>> forests = ca.Forests.load()
@@ -674,7 +643,9 @@ class Forests:
     """
 
     path: Path
+    """File that they are from."""
     model: Model
+    """All that it holds."""
 
     @classmethod
     def load(cls, path: str | Path | None = None) -> Self:
