@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from carillon.errors import UserError
 from carillon.parameters.fields import ValueDomain, parameters_of
-from carillon.parameters.mistyped import alike
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -32,6 +32,9 @@ _RULES = {
 }
 _LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
+ALIKE = 0.7
+"""Share of letters in common (difflib) from which a word is taken for a mistyped one."""
 
 Place = tuple[str | int, ...]
 
@@ -153,3 +156,16 @@ def _limit(value: Any) -> str:
 
 def _shown(value: Any) -> str:
     return f"{list(value) if isinstance(value, tuple) else value!r:.200}"
+
+
+def alike(word: str, words: Iterable[str]) -> str | None:
+    """The one of `words` that a mistyped word is most like, if it is like any.
+
+    Examples
+    --------
+    >>> alike("Validte", ["modes", "validate"]), alike("ring", ["modes", "validate"])
+    ('validate', None)
+    """
+    lower = {each.lower(): each for each in words}
+    found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
+    return lower[found[0]] if found else None

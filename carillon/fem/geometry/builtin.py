@@ -20,7 +20,7 @@ from trimesh.transformations import rotation_matrix
 from carillon import builtin_names
 from carillon.errors import UserError
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
-from carillon.parameters.mistyped import alike
+from carillon.parameters.sentences import alike
 
 SIDE = 0.24
 """Longest side of most trial solids [m]."""
