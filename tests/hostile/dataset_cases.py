@@ -20,7 +20,7 @@ each(
 )
 each("seed", f"{MAKE} --seed VALUE", ["-1", "nan", str(2**63), str(2**64), str(10**30)], "seed")
 each("shards", f"{MAKE} --shards VALUE", ["0", "-1", "nan", "201", str(2**64)])
-each("shard", f"{MAKE} --shards 2 --shard VALUE", ["-1", "2", "nan", str(2**64)], "shard")
+each("shard", f"{MAKE} --shards 2 --shard VALUE", ["2", "-1", "nan", str(2**64)], "shard")
 each("workers", f"{MAKE} --workers VALUE", ["0", "-1", "1.5", "1000000", str(2**64)], "workers")
 each("poisson", f"{MAKE} --poisson VALUE", [*NO_NUMBERS, "0.5", "-1", "1e300"], "poisson")
 each("low", f"{MAKE} --low VALUE", [*NO_NUMBERS, "-1", "1e300", "11"])
@@ -34,7 +34,7 @@ hostile("more samples than any disk holds", "generate --samples 9000000000000000
 each(
     "out",
     "generate --samples 200 --out VALUE",
-    [".", "", "/", "nowhere/s.h5", "/proc/s.h5", "x" * 300, "x" * 250, "s.h5/"],
+    ["nowhere/s.h5", "", "/", "/proc/s.h5", ".", "x" * 300, "x" * 250, "s.h5/"],
 )
 places("out that is", MAKE, "s.h5", "s.h5")
 hostile("out that links to itself", MAKE, files={"s.h5": Place("link", "s.h5")})

@@ -74,7 +74,7 @@ hostile(
 each(
     "tree",
     "grow ZOO/shard.h5 --trees 1 --depth 3 --out t.h5 --tree VALUE",
-    "-1 2 nan '' 2**64",
+    "2 -1 nan '' 2**64",
     "tree",
 )
 hostile("grow to a device", GROW, files={"t.h5": Place("null")})
@@ -138,7 +138,7 @@ hostile("variants into nowhere", "variants ZOO/shard.h5 --out no/v.json", "no/")
 each(
     "curve over",
     "curve ZOO/shard.h5 --rows VALUE",
-    "'' a 0 -5 nan 1e300 1,,2 '1e3;2e3' 10**30 1e9",
+    "1e9 a 0 -5 nan '' 1e300 1,,2 '1e3;2e3' 10**30",
     "rows",
 )
 hostile("curve plotted as MP3", "curve ZOO/shard.h5 --rows 100 --plot c.mp3", "c.mp3")
