@@ -1,6 +1,7 @@
 """What other tools read from an exported design."""
 
 import shutil
+import subprocess
 from pathlib import Path
 
 import h5py
@@ -187,7 +188,7 @@ def player(folder) -> Path:
 
 
 def played(player: Path, *words: float) -> np.ndarray:
-    done = run(player, *words, check=True)
+    done = subprocess.run([player, *map(str, words)], capture_output=True, check=True)
     return np.frombuffer(done.stdout)
 
 
