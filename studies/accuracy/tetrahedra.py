@@ -6,8 +6,6 @@ Both packages are optional, since nothing but this comparison needs them.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module, metadata
 from typing import Any
 
@@ -77,21 +75,13 @@ def tetrahedra(solid: ReferenceSolid, spacing: float, kind: str, modes: int) -> 
     return Spectrum(values, spacing, K.shape[0], meshed - begin, solved - meshed)
 
 
-@contextmanager
-def _gmsh() -> Iterator[Any]:
+def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, NDArray[np.int64]]:
+    """Points (n, 3) [m] and elements (m, 4 or 10) of a solid with edges of about `size` [m]."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
-        yield gmsh
-    finally:
-        gmsh.finalize()
-
-
-def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, NDArray[np.int64]]:
-    """Points (n, 3) [m] and elements (m, 4 or 10) of a solid with edges of about `size` [m]."""
-    with _gmsh() as gmsh:
         x, y, z = solid.sides
         shapes = gmsh.model.occ
         if solid.shape == "box":
@@ -109,6 +99,8 @@ def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, NDArray
         gmsh.model.mesh.setOrder(order)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         _, nodes = gmsh.model.mesh.getElementsByType(GMSH_TETRAHEDRON[order])
+    finally:
+        gmsh.finalize()
     number = np.full(int(tags.max()) + 1, -1)
     number[tags.astype(np.int64)] = np.arange(len(tags))
     elements = number[nodes.astype(np.int64)].reshape(-1, 4 if order == 1 else 10)

@@ -28,7 +28,7 @@ from studies.benchmark.rivals import (
     smallest_without_factor,
     without_purification,
 )
-from studies.benchmark.search import RivalSearch, TimeLimit
+from studies.benchmark.search import RivalSearch
 from studies.benchmark.solid import BenchmarkSolid
 
 Array = NDArray[np.float64]
@@ -155,21 +155,21 @@ class Methods:
         local_mesh = distribute(model, None, self.seed, self.comm)
         layout = Layout.of_local_mesh(local_mesh, self.comm)
         linear = LinearSolver("auto", layout)
-        wanted = min(self.modes + (SPARE_MODES if can_count() else 0), model.n_dofs)
+        count = min(self.modes + (SPARE_MODES if can_count() else 0), model.n_dofs)
         begin = self._now()
         search = RivalSearch(
             assemble(local_mesh, self.comm, layout),
             linear,
-            (self.modes if rival.interval else wanted) - RIGID_MODES,
+            (self.modes if rival.interval else count) - RIGID_MODES,
             (BELOW_ELASTIC * exact[RIGID_MODES], ABOVE_LAST * exact[-1]),
             RIVAL_TOLERANCE,
             self.seed,
-            TimeLimit(self.rival_seconds),
+            self.rival_seconds,
         )
         try:
             pairs = rival.search(search)
             seconds = self._now() - begin
-            search.limit.check()  # not every search asks in between
+            search.check_time()  # not every search asks in between
             values, added = completed(search, pairs, self.modes)
         finally:
             search.system.destroy()

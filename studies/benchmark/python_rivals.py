@@ -42,11 +42,11 @@ def arpack_superlu(search: RivalSearch) -> Pairs:
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    wanted = search.count + RIGID_MODES
-    vectors = max(round(LANCZOS_VECTORS * wanted), wanted + FEWEST_MORE)
+    count = search.count + RIGID_MODES
+    vectors = max(round(LANCZOS_VECTORS * count), count + FEWEST_MORE)
     values, modes = sla.eigsh(
         search.K,
-        wanted,
+        count,
         search.M,
         sigma=-search.shift,
         OPinv=search.operator(factor.solve),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -52,10 +52,6 @@ class SlepcConfiguration:
     def default(cls, ranks: int) -> SlepcConfiguration:
         """What `solver modes --method slepc` does."""
         return cls(definite_packages(ranks)[0], SUBSPACE)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain dictionary, ready for JSON."""
-        return asdict(self)
 
     def __str__(self) -> str:
         return f"{self.package}, {self.subspace:g} vectors a mode"

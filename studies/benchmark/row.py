@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import partial
 from typing import Any, cast
 
@@ -105,9 +106,9 @@ def benchmark_row(
         "modes": benchmark.modes,
         **_times(runs, comm.bcast(None if solid is None else solid.seconds), benchmark),
         **_errors(runs, spectra),
-        "slepc_configuration": methods.configuration.as_dict(),
+        "slepc_configuration": asdict(methods.configuration),
         "slepc_configurations_tried": [
-            {**configuration.as_dict(), "seconds": seconds}
+            {**asdict(configuration), "seconds": seconds}
             for configuration, seconds in tried.items()
         ],
         "runs": {name: len(results) for name, results in runs.items()},

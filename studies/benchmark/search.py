@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,30 +21,6 @@ from solver.subspace.rayleigh_ritz import safe_shift
 Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
 """Eigenvalues (k,) [rad^2/s^2] and vectors (n, k), orthonormal with respect to `RivalSearch.M`."""
-
-
-class TimeLimit:
-    """Wall time that begins when this is made.
-
-    Parameters
-    ----------
-    seconds
-        After which a rival is given up.
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
-        self._end = time.perf_counter() + seconds
-
-    @property
-    def over(self) -> bool:
-        """Whether it is up."""
-        return time.perf_counter() > self._end
-
-    def check(self) -> None:
-        """Raise ConvergenceError if it is up."""
-        if self.over:
-            raise ConvergenceError(f"did not converge in {self._seconds:g} s")
 
 
 @dataclass(frozen=True)
@@ -68,8 +44,8 @@ class RivalSearch:
         Of |K x - lambda M x| / lambda in the 2-norm, where x has unit mass.
     seed
         Of what the search starts from.
-    limit
-        Time that it may take.
+    seconds
+        Wall time from when this is made after which a rival is given up.
     """
 
     system: System
@@ -78,7 +54,18 @@ class RivalSearch:
     interval: tuple[float, float]
     tolerance: float
     seed: int
-    limit: TimeLimit
+    seconds: float
+    begin: float = field(default_factory=time.perf_counter)
+
+    @property
+    def late(self) -> bool:
+        """Whether the time is up."""
+        return time.perf_counter() > self.begin + self.seconds
+
+    def check_time(self) -> None:
+        """Raise ConvergenceError if the time is up."""
+        if self.late:
+            raise ConvergenceError(f"did not converge in {self.seconds:g} s")
 
     @cached_property
     def scale(self) -> Array:
@@ -120,7 +107,7 @@ class RivalSearch:
         """A product with a vector or block (n, k) as SciPy's operator, within the time limit."""
 
         def checked(block: Array) -> Array:
-            self.limit.check()
+            self.check_time()
             return np.asarray(product(block))
 
         return sla.LinearOperator(self.K.shape, matvec=checked, matmat=checked, dtype=float)

@@ -22,7 +22,7 @@ from solver.assembly.petsc_matrix import distributed_matrix
 from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX
 from studies.benchmark.rivals import petsc_options
-from studies.benchmark.search import Array, Pairs, RivalSearch, TimeLimit, ascending
+from studies.benchmark.search import Array, Pairs, RivalSearch, ascending
 
 TYPE = SLEPc.EPS.Type
 STANDARD = (TYPE.KRYLOVSCHUR, TYPE.EVSL)
@@ -111,7 +111,7 @@ def solve(kind: str, search: RivalSearch) -> Pairs:
         solver.setProblemType(problem.GHEP if generalised else problem.HEP)
         solver.setTolerances(search.tolerance, ITERATIONS)
         if kind != TYPE.CISS:  # which knows no test of its own
-            solver.setStoppingTest(partial(_stop, search.limit))
+            solver.setStoppingTest(partial(_stop, search))
         if options.get("st_type") == "precond":
             _deflate(search, solver)
         with petsc_options(options):
@@ -119,7 +119,7 @@ def solve(kind: str, search: RivalSearch) -> Pairs:
             solver.solve()
         converged = solver.getConverged()
         if converged < search.count:
-            search.limit.check()
+            search.check_time()
             raise ConvergenceError(
                 f"SLEPc converged {converged} of {search.count} elastic modes in "
                 f"{solver.getIterationNumber()} iterations"
@@ -154,12 +154,12 @@ def _deflate(search: RivalSearch, solver: SLEPc.EPS) -> None:
 
 
 def _stop(
-    limit: TimeLimit, _: SLEPc.EPS, iterations: int, most: int, converged: int, wanted: int
+    search: RivalSearch, _: SLEPc.EPS, iterations: int, most: int, converged: int, wanted: int
 ) -> int:
     reason = SLEPc.EPS.ConvergedReason
     if converged >= wanted:
         return int(reason.CONVERGED_TOL)
-    return int(reason.DIVERGED_ITS if iterations >= most or limit.over else reason.ITERATING)
+    return int(reason.DIVERGED_ITS if iterations >= most or search.late else reason.ITERATING)
 
 
 def _vectors(solver: SLEPc.EPS, K: PETSc.Mat, found: int) -> Array:

@@ -22,9 +22,8 @@ from solver.refinement.estimate import MODES_USED, estimate_errors
 from solver.refinement.inverse_iteration import InverseIteration
 from solver.refinement.refined_model import RefinedModel
 from studies.coarsening.costs import Taken, as_values, compare_costs, take, timed
-from studies.coarsening.matching import FAR_OFF
 from studies.coarsening.picture_file import ModePicture
-from studies.coarsening.rating import CoarseRating, SolvedModel
+from studies.coarsening.rating import FAR_OFF, CoarseRating, SolvedModel
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,8 @@ from solver.analysis.options import SolverOptions
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.verification.matching import match_modes
-from studies.coarsening.matching import ERROR, LOCAL, SWAP, verdict
 from studies.coarsening.picture_file import ModePicture, read_pictures, write_pictures
-from studies.coarsening.rating import CoarseRating, SolvedModel
+from studies.coarsening.rating import ERROR, LOCAL, SWAP, CoarseRating, SolvedModel, verdict
 from tests import solids
 
 LAST, FOUND = 24, 30

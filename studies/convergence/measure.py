@@ -77,7 +77,10 @@ def correction_history(
     histories = []
     keep = default_keep(modes, local_mesh.decomposition.tree.parts)
     for start in track(STARTS, "starts", visible=comm.rank == 0):
-        block = _start_block(start, local_mesh, keep, seed, comm)
+        if start == RANDOM:
+            block = random_block(local_mesh, keep, seed, comm)
+        else:
+            block = synthesize(local_mesh, keep, start.removeprefix("hcms-"), comm).vectors
         for acceleration in STEPWISE:
             values = _correct(system, linear, block, modes - RIGID_MODES, steps, acceleration)
             histories.append(
@@ -125,7 +128,7 @@ def _correct(
     steps: int,
     acceleration: str,
 ) -> list[Array]:
-    """Ritz values (wanted,) before the first correction and after each."""
+    """Ritz values (requested,) before the first correction and after each."""
     history: list[Array] = []
     correct(
         system,
@@ -138,12 +141,6 @@ def _correct(
         observe=lambda step, values: history.append(values.copy()),
     )
     return history
-
-
-def _start_block(start: str, local_mesh: LocalMesh, keep: int, seed: int, comm: MPI.Comm) -> Array:
-    if start == RANDOM:
-        return random_block(local_mesh, keep, seed, comm)
-    return synthesize(local_mesh, keep, start.removeprefix("hcms-"), comm).vectors
 
 
 def random_block(local_mesh: LocalMesh, columns: int, seed: int, comm: MPI.Comm) -> Array:

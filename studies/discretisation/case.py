@@ -21,8 +21,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
 from solver.verification.errors import frequency_errors
-from studies.discretisation.lattices import voxel_mesh
-from studies.discretisation.methods import TOLERANCE, Given, TimedSpectrum, Ways
+from studies.discretisation.methods import TOLERANCE, Given, TimedSpectrum, Ways, voxel_mesh
 from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, truth_between
 
 Array = NDArray[np.float64]

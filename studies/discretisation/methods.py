@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
-from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
+from carillon.fem.geometry.grid import Grid
 from carillon.fem.model import Constants, Solid, fine_model
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.lattices import covering_on
@@ -29,7 +30,6 @@ from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
 from solver.refinement.refine import Refinable, solve_refined
 from solver.refinement.refined_model import RefinedModel
-from studies.discretisation.lattices import scaled, voxel_mesh
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
     import trimesh
@@ -218,3 +218,21 @@ def _spectrum(model: Solid, modes: Modes, clock: _Clock) -> TimedSpectrum:
     hertz = frequencies(modes.values)
     modes.destroy()
     return TimedSpectrum(hertz, model.n_dofs, clock.seconds)
+
+
+def scaled(lattice: Grid, factor: float) -> Grid:
+    """The lattice with `factor` voxels along the edge of each, or one in place of several.
+
+    Examples
+    --------
+    >>> lattice = Grid(np.zeros(3), 0.5, (8, 4, 4))
+    >>> scaled(lattice, 2).shape, scaled(lattice, 0.5).edge
+    ((16, 8, 8), 1.0)
+    """
+    nx, ny, nz = (round(factor * size) for size in lattice.shape)
+    return Grid(np.asarray(lattice.origin), lattice.edge / factor, (nx, ny, nz))
+
+
+def voxel_mesh(surface: trimesh.Trimesh, resolution: int, components: str, name: str) -> HexMesh:
+    """Voxels of a surface, see `carillon.fem.geometry.voxelize`."""
+    return hexmesh_from_voxels(voxelize(surface, resolution, components=components, name=name))

@@ -12,8 +12,7 @@ from carillon.fem.geometry import builtin_surface, hexmesh_from_grid
 from carillon.fem.geometry.grid import Grid
 from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.material import HARMONIC, PlacedMaterial
-from studies.discretisation.lattices import scaled, voxel_mesh
-from studies.discretisation.methods import TimedSpectrum
+from studies.discretisation.methods import TimedSpectrum, scaled, voxel_mesh
 from studies.discretisation.truth import truth_between
 
 LATTICE = Grid(np.array([0.1, 0.2, 0.3]), 0.01, (8, 4, 4))

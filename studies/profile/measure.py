@@ -168,14 +168,14 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, A
     width = carried_count(elastic, EIGENVALUE_TOLERANCE)
     accurate = accurate_count(elastic, EIGENVALUE_TOLERANCE)
     cold = from_nothing(system, linear, elastic, accurate, width, law, EIGENVALUE_TOLERANCE, seed)
-    found, shift = cold.result, cold.inverse.shift
+    lanczos, shift = cold.result, cold.inverse.shift
     cold.inverse.destroy()
     del cold
-    start = start_block(system, -(-found.solves // found.blocks), seed)
+    start = start_block(system, -(-lanczos.solves // lanczos.blocks), seed)
     meters = []
     for _ in range(options.runs):
         meters.append(_Meter())
-        _replay(system, linear, shift, start, found.blocks, width, meters[-1])
+        _replay(system, linear, shift, start, lanczos.blocks, width, meters[-1])
     phases = {
         name: asdict(phase)
         | {"seconds": statistics.median(meter.phases[name].seconds for meter in meters)}
@@ -184,7 +184,7 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, A
     return {
         "n_dofs": model.n_dofs,
         "modes": options.modes,
-        "right_hand_sides": found.solves,
+        "right_hand_sides": lanczos.solves,
         "block": start.shape[1],
         "threads": threads,
         "runs": options.runs,
