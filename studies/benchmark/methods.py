@@ -70,10 +70,11 @@ class MethodRun:
     added: int = 0
 
 
+@dataclass
 class Methods:
     """Every way to the lowest modes of one solid; all ranks call the same.
 
-    Parameters
+    Attributes
     ----------
     solid
         On rank 0, None elsewhere.
@@ -89,25 +90,15 @@ class Methods:
         Wall time [s] after which a further rival is given up.
     """
 
-    def __init__(
-        self,
-        solid: BenchmarkSolid | None,
-        modes: int,
-        configuration: SlepcConfiguration,
-        seed: int = 0,
-        comm: MPI.Comm = MPI.COMM_WORLD,
-        brief: bool = False,
-        rival_seconds: float = RIVAL_SECONDS,
-    ) -> None:
-        self.solid = solid
-        self.modes = modes
-        self.configuration = configuration
-        self.seed = seed
-        self.comm = comm
-        self.brief = brief
-        self.rival_seconds = rival_seconds
-        self._exact: Array | None = None
-        self._warm: tuple[ModalSolver, Modes] | None = None
+    solid: BenchmarkSolid | None
+    modes: int
+    configuration: SlepcConfiguration
+    seed: int = 0
+    comm: MPI.Comm = field(default_factory=lambda: MPI.COMM_WORLD)
+    brief: bool = False
+    rival_seconds: float = RIVAL_SECONDS
+    _exact: Array | None = None
+    _warm: tuple[ModalSolver, Modes] | None = None
 
     def general(
         self,

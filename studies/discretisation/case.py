@@ -21,7 +21,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
 from solver.verification.errors import frequency_errors
-from studies.discretisation.methods import TOLERANCE, Given, TimedSpectrum, Ways, voxel_mesh
+from studies.discretisation.methods import TOLERANCE, TimedSpectrum, Ways, voxel_mesh
 from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, truth_between
 
 Array = NDArray[np.float64]
@@ -62,8 +62,9 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     """
     coarsening = replace(options, coarsen=FOREST).coarsening()
     assert coarsening is not None
-    _run_once(WARM_UP, coarsening, WARM_UP_MODES)
-    ways = Ways(_given(options), coarsening, modes)
+    for way in _ways(WARM_UP, coarsening, WARM_UP_MODES).named.values():
+        way()
+    ways = _ways(options, coarsening, modes)
     found: dict[str, list[TimedSpectrum]] = {name: [] for name in ways.named}
     for _ in track(range(runs), "rounds"):
         for name, way in ways.named.items():
@@ -89,7 +90,7 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     }
 
 
-def _given(options: ProblemOptions) -> Given:
+def _ways(options: ProblemOptions, coarsening: Coarsening, modes: int) -> Ways:
     require_constants(options.poisson, options.density)
     surface = geometry.load_surface(options.mesh, options.unit)
     name = geometry.surface_name(options.mesh)
@@ -102,12 +103,8 @@ def _given(options: ProblemOptions) -> Given:
         options.material in INTERPOLATED,
     )
     constants: Constants = {"poisson": options.poisson, "density": options.density}
-    return Given(surface, name, options.components, options.resolution, material, constants)
-
-
-def _run_once(options: ProblemOptions, coarsening: Coarsening, modes: int) -> None:
-    for way in Ways(_given(options), coarsening, modes).named.values():
-        way()
+    solid = (surface, name, options.components, options.resolution, material, constants)
+    return Ways(*solid, coarsening, modes)
 
 
 def _named(name: str, way: Callable[[], TimedSpectrum]) -> TimedSpectrum:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -28,7 +28,7 @@ from solver.files.modes_file import CHECKS, frequencies
 from solver.refinement.coarse_or_fine import solve_coarsened
 from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
-from solver.refinement.refine import Refinable, solve_refined
+from solver.refinement.refine import solve_refined
 from solver.refinement.refined_model import RefinedModel
 
 if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
@@ -38,30 +38,6 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Relative error of the eigenvalues that every way corrects to."""
-
-
-@dataclass(frozen=True)
-class Given:
-    """A solid before it is discretised.
-
-    Attributes
-    ----------
-    surface, name, components
-        See `carillon.fem.geometry.voxelize`.
-    resolution
-        Voxels along the longest side.
-    material
-        Young's modulus at any place, by the lattice of the voxels.
-    constants
-        Poisson's ratio and density [kg/m^3].
-    """
-
-    surface: trimesh.Trimesh
-    name: str
-    components: str
-    resolution: int
-    material: PlacedMaterial
-    constants: Constants
 
 
 @dataclass(frozen=True)
@@ -86,23 +62,34 @@ class _Clock:
         self.seconds[phase] = self._mark - before - without
 
 
+@dataclass(frozen=True)
 class Ways:
     """All ways for one solid, each from its surface on; on this rank alone.
 
-    Parameters
+    Attributes
     ----------
-    given
-        The solid.
+    surface, name, components
+        See `carillon.fem.geometry.voxelize`.
+    resolution
+        Voxels along the longest side.
+    material
+        Young's modulus at any place, by the lattice of the voxels.
+    constants
+        Poisson's ratio and density [kg/m^3].
     coarsening
         For its blocks.
     modes
         Number of modes, rigid ones included.
     """
 
-    def __init__(self, given: Given, coarsening: Coarsening, modes: int) -> None:
-        self._given = given
-        self._coarsening = coarsening
-        self._modes = modes
+    surface: trimesh.Trimesh
+    name: str
+    components: str
+    resolution: int
+    material: PlacedMaterial
+    constants: Constants
+    coarsening: Coarsening
+    modes: int
 
     @property
     def named(self) -> dict[str, Callable[[], TimedSpectrum]]:
@@ -114,7 +101,7 @@ class Ways:
             "half-cells": lambda: self.cells(0.5),
             "half-cells-divided": lambda: self.divided(0.5),
         }
-        if not self._given.material.interpolated:
+        if not self.material.interpolated:
             ways["half-cells-harmonic"] = lambda: self.cells(0.5, HARMONIC)
         return {**ways, "cells": lambda: self.cells(1.0)}
 
@@ -122,21 +109,21 @@ class Ways:
         """The voxels themselves."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
-        return self._solved(fine_model(mesh, young, **self._given.constants), clock)
+        return self._solved(fine_model(mesh, young, **self.constants), clock)
 
     def coarse(self) -> TimedSpectrum:
         """Coarse elements of their blocks."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
-        model = build_model(mesh, young, self._coarsening, **self._given.constants)
+        model = build_model(mesh, young, self.coarsening, **self.constants)
         return self._solved(model, clock)
 
     def refined(self) -> TimedSpectrum:
         """The same with blocks fine for an expected error of `ALLOWED_ERROR`, or the voxels."""
         clock = _Clock()
         mesh, young = self._voxels(clock)
-        fine = fine_model(mesh, young, **self._given.constants)
-        refined = RefinedModel(fine, self._coarsening)
+        fine = fine_model(mesh, young, **self.constants)
+        refined = RefinedModel(fine, self.coarsening)
         clock.end("model")
         options = self._options
         solve = SolveByOptions(options, MPI.COMM_SELF)
@@ -149,9 +136,7 @@ class Ways:
         """Cells of which some are divided for an expected error of `ALLOWED_DISTANCE`."""
         clock = _Clock()
         cover, model = self._cells(factor, ARITHMETIC, clock)
-        return self._refined(DividedCells(cover, model), ALLOWED_DISTANCE, clock)
-
-    def _refined(self, start: Refinable[Any], tolerance: float, clock: _Clock) -> TimedSpectrum:
+        start = DividedCells(cover, model)
         clock.end("model")
         checks = 0.0
 
@@ -162,10 +147,10 @@ class Ways:
             checks += _checks(modes)
             return modes
 
-        model, modes, _ = solve_refined(solve, start, tolerance, MPI.COMM_SELF)
+        divided, modes, _ = solve_refined(solve, start, ALLOWED_DISTANCE, MPI.COMM_SELF)
         clock.end("solve", checks)
-        assert model is not None
-        return _spectrum(model, modes, clock)
+        assert divided is not None
+        return _spectrum(divided, modes, clock)
 
     def cells(self, factor: float, power: float = ARITHMETIC) -> TimedSpectrum:
         """Finite cells on a lattice of `factor` voxels in the place of one.
@@ -178,21 +163,19 @@ class Ways:
     def _cells(
         self, factor: float, power: float, clock: _Clock
     ) -> tuple[Covering, FiniteCellModel]:
-        given = self._given
-        lattice = scaled(given.material.lattice, factor)
-        cover = covering_on(given.surface, lattice, given.components, given.name)
+        lattice = scaled(self.material.lattice, factor)
+        cover = covering_on(self.surface, lattice, self.components, self.name)
         mesh = cover.cells.mesh
         clock.end("mesh")
-        young = given.material.on(mesh, power)
+        young = self.material.on(mesh, power)
         clock.end("material")
-        poisson, density = given.constants["poisson"], given.constants["density"]
+        poisson, density = self.constants["poisson"], self.constants["density"]
         return cover, finite_cell_model(cover.cells, young, poisson, density)
 
     def _voxels(self, clock: _Clock) -> tuple[HexMesh, Array]:
-        given = self._given
-        mesh = voxel_mesh(given.surface, given.resolution, given.components, given.name)
+        mesh = voxel_mesh(self.surface, self.resolution, self.components, self.name)
         clock.end("mesh")
-        young = given.material.on(mesh)
+        young = self.material.on(mesh)
         clock.end("material")
         return mesh, young
 
@@ -207,7 +190,7 @@ class Ways:
 
     @property
     def _options(self) -> SolverOptions:
-        return SolverOptions(modes=self._modes, tolerance=TOLERANCE)
+        return SolverOptions(modes=self.modes, tolerance=TOLERANCE)
 
 
 def _checks(modes: Modes) -> float:
