@@ -53,21 +53,6 @@ AT_ONCE = 500
 """Blocks whose flexibility matrices are in memory together."""
 
 
-class Load(NamedTuple):
-    """A load case in terms of the coarse element: it answers `left K_c^-1 right`.
-
-    Attributes
-    ----------
-    left : (18, 18)
-        What its answer is taken to.
-    right : (18, m)
-        The load.
-    """
-
-    left: Array
-    right: Array
-
-
 @dataclass(frozen=True)
 class ErrorTables:
     """What a void pattern decides; r = active degrees of freedom less motions without strain.
@@ -81,14 +66,15 @@ class ErrorTables:
     inertia, corners : (r, 18)
         Inertial loads W and corner forces C^T Z.
     loads
-        The load cases by name.
+        Matrices (18, 18) and (18, m) by load case: the coarse element answers
+        `left @ K_c^-1 @ right`.
     """
 
     stiffness: Array
     basis: Array
     inertia: Array
     corners: Array
-    loads: dict[str, Load]
+    loads: dict[str, tuple[Array, Array]]
 
 
 class FineResponse(NamedTuple):
@@ -154,9 +140,9 @@ def tables_of(mask: int, poisson: float) -> ErrorTables:
     corners = complement.T @ corner_selection(mask, poisson).T @ motions
     unit = np.eye(motions.shape[1])
     loads = {
-        "nodal": Load(factor, factor.T),
-        "inertial": Load(factor, factor.T @ basis.T @ inertia),
-        "corner": Load(unit, unit),
+        "nodal": (factor, factor.T),
+        "inertial": (factor, factor.T @ basis.T @ inertia),
+        "corner": (unit, unit),
     }
     return ErrorTables(stiffness, basis, inertia, corners, loads)
 
@@ -230,7 +216,8 @@ def pattern_errors(
         flexibility = coarse_flexibility(answer, poisson) if answer.ndim == 2 else answer
         squared = {}
         for name in LOADS:
-            error = loads[name].left @ flexibility @ loads[name].right - fine[name].target
+            left, right = loads[name]
+            error = left @ flexibility @ right - fine[name].target
             squared[name] = _square(error) + fine[name].rest
         errors.append(Errors(squared, minimum, reference))
     return errors

@@ -147,7 +147,7 @@ def test_no_element_falls_below_the_least_error_and_one_reaches_it():
     for errors in found:
         for load in LOADS:
             assert (errors.relative(load) >= errors.relative_minimum(load) * (1 - 1e-12)).all()
-    inverse = np.linalg.inv(tables_of(255, POISSON).loads["nodal"].left)
+    inverse = np.linalg.inv(tables_of(255, POISSON).loads["nodal"][0])
     free = [FreeBlock(block) for block in young]
     basis = free[0].without_null @ prolongation() @ straining_motions() @ inverse
     best = np.stack([inverse @ basis.T @ one.flexibility @ basis @ inverse.T for one in free])

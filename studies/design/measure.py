@@ -62,7 +62,7 @@ def compare_optimisers(
     problem: DesignProblem,
     seeds: int = 1,
     fine_check: bool = False,
-    report: Callable[[str], None] | None = None,
+    report: Callable[[str], None] = lambda what: None,
 ) -> list[dict[str, Any]]:
     """One row for each optimiser, all with the project's budget and workers.
 
@@ -80,8 +80,7 @@ def compare_optimisers(
         found = []
         for number in range(seeds):
             seed = project.optimiser.seed + number
-            if report is not None:
-                report(method if seeds == 1 else f"{method}, seed {seed}")
+            report(method if seeds == 1 else f"{method}, seed {seed}")
             chosen = replace(project.optimiser, method=method, seed=seed, fine_check=fine_check)
             own = replace(problem, project=replace(project, optimiser=chosen))
             found.append(_outcome(optimise(own)))
@@ -93,14 +92,13 @@ def time_sizes(
     project: Project,
     resolutions: Sequence[int],
     runs: int,
-    report: Callable[[str], None] | None = None,
+    report: Callable[[str], None] = lambda what: None,
 ) -> list[dict[str, Any]]:
     """Times of evaluations of the project's solid at several resolutions, one row for each."""
     targets: Targets | None = None
     rows = []
     for resolution in resolutions:
-        if report is not None:
-            report(f"evaluations at resolution {resolution}")
+        report(f"evaluations at resolution {resolution}")
         problem = prepare(replace(project, resolution=resolution), targets)
         targets = problem.setting.objective.targets
         times = time_evaluations(problem, runs, project.optimiser.seed)
@@ -113,11 +111,10 @@ def benchmark(
     runs: int,
     seeds: int = 1,
     fine_check: bool = False,
-    report: Callable[[str], None] | None = None,
+    report: Callable[[str], None] = lambda what: None,
 ) -> dict[str, Any]:
     """Times of evaluations, and the optimisers' rows, see `compare_optimisers`."""
-    if report is not None:
-        report("evaluations")
+    report("evaluations")
     times = time_evaluations(problem, runs, problem.project.optimiser.seed)
     rows = compare_optimisers(problem, seeds, fine_check, report)
     return {"evaluation": times, "rows": rows}
