@@ -11,7 +11,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Annotated, Any, cast
 
 import numpy as np
@@ -54,21 +54,9 @@ class ProfileOptions:
     runs: Annotated[int, between(1, 1000)] = option(5, "runs of which medians are taken")
 
 
-@dataclass
-class Phase:
-    """What a phase took.
-
-    Attributes
-    ----------
-    seconds
-        Wall time; the median of all runs in a profile.
-    operations, bytes
-        Floating-point operations, and bytes between memory and processor at least; 0 if not known.
-    """
-
-    seconds: float = 0.0
-    operations: float = 0.0
-    bytes: float = 0.0
+Phase = dict[str, float]
+"""What a phase took: `seconds` of wall time, floating-point `operations`, and `bytes` moved between
+memory and processor at least; 0 if not known."""
 
 
 @dataclass
@@ -84,10 +72,9 @@ class _Meter:
         begin = time.perf_counter()
         yield
         whole = time.perf_counter() - begin
-        phase = self.phases.setdefault(name, Phase())
-        phase.seconds += whole - self._inner.pop()
-        phase.operations += operations
-        phase.bytes += moved
+        took = {"seconds": whole - self._inner.pop(), "operations": operations, "bytes": moved}
+        before = self.phases.get(name, {})
+        self.phases[name] = {key: before.get(key, 0.0) + each for key, each in took.items()}
         if self._inner:
             self._inner[-1] += whole
 
@@ -177,8 +164,8 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, A
         meters.append(_Meter())
         _replay(system, linear, shift, start, lanczos.blocks, width, meters[-1])
     phases = {
-        name: asdict(phase)
-        | {"seconds": statistics.median(meter.phases[name].seconds for meter in meters)}
+        name: phase
+        | {"seconds": statistics.median(meter.phases[name]["seconds"] for meter in meters)}
         for name, phase in meters[0].phases.items()
     }
     return {
@@ -265,7 +252,7 @@ def profile_lines(result: dict[str, Any]) -> list[str]:
     ]
     phases = result["phases"]
     rest = result["seconds"] - sum(phase["seconds"] for phase in phases.values())
-    others = {"assembly, checks": asdict(Phase(max(rest, 0.0)))}
+    others = {"assembly, checks": {"seconds": max(rest, 0.0), "operations": 0.0, "bytes": 0.0}}
     for name, phase in {**phases, **others}.items():
         seconds = phase["seconds"]
         line = f"{name:<20}{seconds:>8.3f}{seconds / result['seconds']:>8.0%}"
