@@ -87,11 +87,6 @@ class Database:
         stored = (self.materials, self.keys, self.entries, self.moduli)
         return sum(array.nbytes for array in stored)
 
-    @property
-    def has_void(self) -> bool:
-        """Whether void is one of the materials."""
-        return bool(self.materials[0] == 0.0)
-
 
 def base_materials(moduli: Moduli, count: int, void: bool = False) -> Array:
     """Young's moduli (count,) to represent a range, in its unit; void is one of them if `void`.
@@ -230,7 +225,7 @@ def look_up(database: Database, young: ArrayLike) -> Array:
         See `forests.evaluate.require_blocks`, and for void cells in a database without void.
     """
     blocks = require_blocks(young)
-    void = int(database.has_void)
+    void = int(database.materials[0] == 0.0)
     solid = database.materials[void:]
     out = np.empty_like(blocks)
     missing = _look_up(

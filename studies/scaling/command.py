@@ -20,6 +20,7 @@ from solver.commands.running import add_solid, on_ranks, parameters, require_out
 from solver.distribution.collective import compute_on_root
 from studies.scaling.measure import measure
 from studies.scaling.runs import ScalingOptions, scaling_study, study_lines
+from workflow.arguments import options
 
 EXAMPLES = """example:
   scaling builtin:bell --resolution 40 --ranks 1,2,4 --plot scaling.svg
@@ -43,12 +44,10 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.here or comm.size > 1:
             result, lines = _measured_here(arguments, comm)
         else:
-            options = collect(ScalingOptions, arguments)
-            result = scaling_study(
-                collect(ProblemOptions, arguments), options, _repeated(arguments)
-            )
+            how = collect(ScalingOptions, arguments)
+            result = scaling_study(collect(ProblemOptions, arguments), how, _repeated(arguments))
             lines = study_lines(result)
-            result["provenance"] = measured(parameters(arguments), options.ranks, threads=1)
+            result["provenance"] = measured(parameters(arguments), how.ranks, threads=1)
         write_json(arguments, result, comm)
         if comm.rank:
             return
@@ -73,13 +72,6 @@ def _measured_here(
 
 def _repeated(arguments: argparse.Namespace) -> list[str]:
     """Arguments with which the same solid is solved again, but for mesh and resolution."""
-    fields = [field.name for field in dataclasses.fields(ProblemOptions)]
-    names = [name for name in fields if name not in ("mesh", "resolution")]
-    words: list[str] = []
-    for name in (*names, "modes", "tolerance", "linear_solver"):
-        value, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"
-        if value is True:
-            words.append(flag)
-        elif value is not None and value is not False:
-            words += [flag, str(value)]
-    return words
+    solid = {field.name for field in dataclasses.fields(ProblemOptions)} - {"mesh", "resolution"}
+    names = (*sorted(solid), "modes", "tolerance", "linear_solver")
+    return options({name: getattr(arguments, name) for name in names})
