@@ -45,10 +45,7 @@ def path_word(path: str | Path) -> str:
 def quoted(command: str) -> str:
     """A command line whose words mean nothing to a shell but themselves.
 
-    Raises
-    ------
-    ValueError
-        If a quotation in it does not end.
+    Raises ValueError if a quotation in it does not end.
 
     Examples
     --------

@@ -19,10 +19,7 @@ MODULES = ".snakemake/pip-deployments"
 def make_folder(folder: Path) -> None:
     """Make a folder for results, and those that it is in, unless it is there.
 
-    Raises
-    ------
-    UserError
-        If that is not possible.
+    Raises UserError if that is not possible.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -33,10 +30,8 @@ def make_folder(folder: Path) -> None:
 def require_own(folder: Path) -> None:
     """Check that nothing in a folder of results leads a run out of it, or into code of others.
 
-    Raises
-    ------
-    UserError
-        If there is a link anywhere in it, or a folder from which Snakemake would load modules.
+    Raises UserError if there is a link anywhere in it, or a folder from which Snakemake would load
+    modules.
     """
     if (folder / MODULES).exists():
         raise UserError(
@@ -55,15 +50,9 @@ def require_own(folder: Path) -> None:
 def require_place(folder: Path, what: str) -> None:
     """Check that a folder for results is there or can be made.
 
-    Parameters
-    ----------
-    what
-        Names it, for messages.
+    Raises UserError if something else is there, or nothing can be written where it would be made.
 
-    Raises
-    ------
-    UserError
-        If something else is there, or nothing can be written where it would be made.
+    `what`: names it, for messages.
     """
     try:
         there = next(each for each in (folder, *folder.parents) if each.exists())

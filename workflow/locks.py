@@ -29,10 +29,7 @@ def take(folder: Path = FOLDER) -> bool:
     Locks of a run on another machine stay, as some network file systems keep the kernel's locks to
     one machine; `snakemake --unlock` removes them.
 
-    Parameters
-    ----------
-    folder
-        Snakemake's folder in the working directory.
+    `folder`: Snakemake's folder in the working directory.
     """
     folder.mkdir(exist_ok=True)
     file = (folder / "carillon.run").open("a+")

@@ -84,10 +84,8 @@ def main(folder: str, command: str, *arguments: str) -> int:
 class Slurm:
     """SLURM's own commands, and the jobs that were submitted.
 
-    Parameters
-    ----------
-    folder
-        Where commands of this module are, which are not SLURM's own, and where jobs are noted.
+    `folder`: where commands of this module are, which are not SLURM's own, and where jobs are
+    noted.
     """
 
     def __init__(self, folder: Path) -> None:

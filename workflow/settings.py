@@ -39,18 +39,15 @@ def complete(files: Iterable[str | Path], given: Values = MappingProxyType({})) 
     takes 1e-3 for text, 2020-01-01 for a date, the last of several equal keys, and what is there
     once for a million times.
 
+    Raises UserError if a file cannot be read, see `carillon.files.yaml_input.read_yaml`; or with
+    one sentence about the first value that does not fit, and the line that it is in.
+
     Parameters
     ----------
     files
         Later ones take precedence.
     given
         Values that take precedence over all files.
-
-    Raises
-    ------
-    UserError
-        If a file cannot be read, see `carillon.files.yaml_input.read_yaml`; or with one sentence
-        about the first value that does not fit, and the line that it is in.
     """
     documents = [(str(file), *read_marked(file, CONFIGURATION)) for file in files]
     config: dict[str, Any] = {}
@@ -92,11 +89,8 @@ def config_hash(config: Mapping[str, Any]) -> str:
 def check_files(config: Mapping[str, Any]) -> None:
     """Check that a run can write, and read what its complete configuration names.
 
-    Raises
-    ------
-    UserError
-        If the folder of the results cannot be written, or a model's mesh or material or the forests
-        do not exist.
+    Raises UserError if the folder of the results cannot be written, or a model's mesh or material
+    or the forests do not exist.
     """
     require_place(Path(config["results_dir"]), "results_dir")
     for name in config["models"]:
@@ -139,10 +133,7 @@ def model_files(config: Mapping[str, Any], model: str) -> list[str]:
 def forests_file(config: Mapping[str, Any]) -> str | None:
     """Forests to coarsen by that are there already; None if the run trains its own.
 
-    Raises
-    ------
-    UserError
-        If no forests come with the package, but are wanted.
+    Raises UserError if no forests come with the package, but are wanted.
     """
     named: str | None = config["forests"]["model"]
     if named == DEFAULT_FORESTS:

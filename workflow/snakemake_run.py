@@ -36,6 +36,8 @@ def run_target(
 ) -> None:
     """Make a target of the rules, with all files in the folder of the configuration; show progress.
 
+    Raises UserError with what a program said, or Snakemake, if the target was not made.
+
     Parameters
     ----------
     target
@@ -48,11 +50,6 @@ def run_target(
         File that gets what Snakemake and its jobs print.
     snakefile
         The rules.
-
-    Raises
-    ------
-    UserError
-        With what a program said, or Snakemake, if the target was not made.
     """
     folder = configfile.parent
     reading, writing = os.pipe()

@@ -42,10 +42,7 @@ def absent_meshes(config: Config, section: str) -> dict[str, str]:
 def named(config: Config, where: str) -> list[str]:
     """Solids that a part of the configuration names, as far as their mesh exists.
 
-    Parameters
-    ----------
-    where
-        Keys joined by dots, such as `models`, `scaling.models` or `figures.scaling`.
+    `where`: keys joined by dots, such as `models`, `scaling.models` or `figures.scaling`.
     """
     section, _, part = where.rpartition(".")
     names = list(config[section][part] if section else config[part])
@@ -56,10 +53,7 @@ def named(config: Config, where: str) -> list[str]:
 def measured_files(config: Config, measured: Mapping[str, str]) -> list[str]:
     """Files of what a study measures of its solids, below its folder.
 
-    Parameters
-    ----------
-    measured
-        Where the configuration names the solids, see `named`, by the file of what is found.
+    `measured`: where the configuration names the solids, see `named`, by the file of what is found.
     """
     return [
         f"models/{solid}/{file}.json"

@@ -49,10 +49,7 @@ _asked: set[str] = set()
 def read(path: Path) -> Source:
     """What a source file says.
 
-    Raises
-    ------
-    OSError, SyntaxError
-        If it is no file of Python.
+    Raises OSError, SyntaxError if it is no file of Python.
     """
     content = path.read_bytes()
     version = hashlib.sha256(content).hexdigest()

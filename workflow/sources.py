@@ -27,15 +27,9 @@ OF_CARILLON = Path(rooms.PARENT)
 def fingerprint(*modules: str) -> str:
     """Short SHA-256 of modules of the project and of all that they import from it.
 
-    Parameters
-    ----------
-    modules
-        Names such as `dataset_gen.generate`.
+    Raises ValueError if the project has no such module.
 
-    Raises
-    ------
-    ValueError
-        If the project has no such module.
+    `modules`: names such as `dataset_gen.generate`.
     """
     digest = hashlib.sha256()
     for path in sorted(_needed(modules)):

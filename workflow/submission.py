@@ -20,18 +20,15 @@ _PLAIN = re.compile(r"[\w@%+=:,./-]*", re.ASCII)
 def require_plain(paths: Iterable[str | Path], given: Mapping[str, Any]) -> None:
     """Check before jobs are submitted that their scripts can hold what they are started with.
 
+    Raises UserError if a path has a character that means something within double quotes, or a value
+    one that does without quotes.
+
     Parameters
     ----------
     paths
         Of the rules, the working directory and configuration files.
     given
         Values of the configuration that the command line gives.
-
-    Raises
-    ------
-    UserError
-        If a path has a character that means something within double quotes, or a value one that
-        does without quotes.
     """
     for path in map(str, paths):
         if _SPECIAL.search(path):

@@ -11,8 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 from annotated_types import Ge
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.finite_cells.model import FiniteCellModel
@@ -30,8 +30,6 @@ from solver.refinement.errors import FROM_SOLID
 from solver.refinement.fine_start import FineStart
 from solver.verification.errors import frequency_errors
 from studies.accuracy.solids import ANGLES
-
-Array = NDArray[np.float64]
 
 ELASTIC = 30
 """Frequencies compared."""
@@ -62,21 +60,15 @@ class DistanceStudyOptions:
 def measure_distances(objects: tuple[str, ...], options: DistanceStudyOptions) -> dict[str, Any]:
     """Expected and true errors of the first frequencies of solids, by every way.
 
-    Parameters
-    ----------
-    objects
-        Mesh files or built-in objects.
+    Raises UserError if an object is no use, or the reference's lattice is not finer.
+
+    `objects`: mesh files or built-in objects.
 
     Returns
     -------
     dict[str, Any]
         Plain values: `solids`, each with its reference and `ways`; `right`, of every way the number
         of expected errors within a factor of `FACTOR` and of all.
-
-    Raises
-    ------
-    UserError
-        If an object is no use, or the reference's lattice is not finer.
     """
     if options.reference <= options.resolution:
         raise UserError(

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
+
 Sides = tuple[float, float, float]
 Degrees = tuple[int, int, int]
 

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.model import RIGID_MODES
@@ -21,8 +21,6 @@ from solver.verification.errors import frequency_errors
 from studies.accuracy.solids import ANGLES, POISSON, SOLIDS, ReferenceSolid
 from studies.accuracy.spectra import Spectrum, cells
 from studies.accuracy.tetrahedra import ORDERS, missing, tetrahedra, versions
-
-Array = NDArray[np.float64]
 
 ELASTIC = 30
 """Frequencies compared."""

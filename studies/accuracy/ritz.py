@@ -7,12 +7,10 @@ from itertools import product
 import numpy as np
 import scipy.linalg as la
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.element import elasticity_matrix
 from studies.accuracy.domains import Degrees, Domain
-
-Array = NDArray[np.float64]
 
 INDEPENDENT = 1e-9
 """Singular value, relative to the largest, below which polynomials are told apart by rounding."""

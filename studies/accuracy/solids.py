@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Surface
 from carillon.fem.model import RIGID_MODES
 from studies.accuracy import domains
 from studies.accuracy.domains import Degrees, Domain, Sides
 from studies.accuracy.ritz import free_eigenvalues
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Array = NDArray[np.float64]
 
 ANGLES = (25.0, 35.0, 15.0)
 """Degrees about x, y and z by which solids are turned against the lattice."""
@@ -71,7 +65,7 @@ class ReferenceSolid:
         """Quadrature that is exact for products of two polynomials of these degrees."""
         return DOMAINS[self.shape](self.sides, degrees)
 
-    def surface(self) -> trimesh.Trimesh:
+    def surface(self) -> Surface:
         """Triangles, turned by `ANGLES`; a curved one encloses the solid's own volume."""
         from trimesh.transformations import euler_matrix
 
@@ -79,7 +73,7 @@ class ReferenceSolid:
         return surface.apply_transform(euler_matrix(*np.radians(ANGLES)))
 
 
-def _unturned(shape: str, sides: Sides) -> trimesh.Trimesh:
+def _unturned(shape: str, sides: Sides) -> Surface:
     import trimesh
 
     if shape == "box":

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Surface
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.model import Solid, fine_model
 from solver.accuracy.estimate import estimate_cell_errors
@@ -18,11 +17,6 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import DISCRETISATIONS, ProblemOptions, discretised
 from solver.analysis.solid_surface import SolidSurface
 from studies.accuracy.solids import DENSITY, POISSON, YOUNG
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -49,13 +43,10 @@ class Spectrum:
     expected: float | None = None
 
 
-def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes: int) -> Spectrum:
+def cells(surface: Surface, name: str, spacing: float, kind: str, modes: int) -> Spectrum:
     """Lowest eigenvalues by a discretisation on a lattice of about this spacing [m].
 
-    Raises
-    ------
-    UserError
-        If the solid falls apart in such a lattice.
+    Raises UserError if the solid falls apart in such a lattice.
     """
     assert kind in DISCRETISATIONS
     longest = float(np.ptp(surface.bounds, axis=0).max())
@@ -75,7 +66,7 @@ def cells(surface: trimesh.Trimesh, name: str, spacing: float, kind: str, modes:
     return Spectrum(found.values, spacing, model.n_dofs, built - begin, seconds, expected)
 
 
-def _model(surface: trimesh.Trimesh, options: ProblemOptions) -> Solid:
+def _model(surface: Surface, options: ProblemOptions) -> Solid:
     mesh, cells = discretised(SolidSurface(options.mesh, surface), options)
     young = np.full(mesh.n_cells, YOUNG)
     if cells is None:

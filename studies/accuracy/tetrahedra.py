@@ -12,16 +12,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.errors import one_line
 from carillon.processes.slepc import SLEPc
 from solver.assembly.petsc_matrix import distributed_matrix
 from solver.linear.factorisation import factor_package
 from studies.accuracy.solids import DENSITY, POISSON, YOUNG, ReferenceSolid
 from studies.accuracy.spectra import Spectrum
-
-Array = NDArray[np.float64]
 
 PACKAGES = ("gmsh", "skfem")
 INSTALLED_BY = ("gmsh", "scikit-fem")
@@ -75,7 +73,7 @@ def tetrahedra(solid: ReferenceSolid, spacing: float, kind: str, modes: int) -> 
     return Spectrum(values, spacing, K.shape[0], meshed - begin, solved - meshed)
 
 
-def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, NDArray[np.int64]]:
+def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, Index]:
     """Points (n, 3) [m] and elements (m, 4 or 10) of a solid with edges of about `size` [m]."""
     import gmsh
 
@@ -110,7 +108,7 @@ def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, NDArray
     return coordinates.reshape(-1, 3)[used], place[elements]
 
 
-def matrices(points: Array, elements: NDArray[np.int64]) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def matrices(points: Array, elements: Index) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """K [N/m] and consistent M [kg] of linear or quadratic tetrahedra with faces alike."""
     from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector, MeshTet
     from skfem.helpers import dot
@@ -134,7 +132,7 @@ def matrices(points: Array, elements: NDArray[np.int64]) -> tuple[sp.csr_matrix,
     return K.tocsr(), mass.assemble(basis).tocsr()
 
 
-def _curved(straight: Any, points: Array, elements: NDArray[np.int64]) -> Any:
+def _curved(straight: Any, points: Array, elements: Index) -> Any:
     """The mesh whose edges have their midpoints where Gmsh has put them."""
     from dataclasses import replace
 

@@ -124,10 +124,7 @@ def completed(search: RivalSearch, pairs: Pairs, modes: int) -> tuple[Array, int
 
     What it found is judged by the count of eigenvalues, and others find what it lacks.
 
-    Raises
-    ------
-    ConvergenceError
-        If it found too few, or some of its values are no eigenvalues.
+    Raises ConvergenceError if it found too few, or some of its values are no eigenvalues.
     """
     if RIGID_MODES + len(pairs[0]) < modes:
         raise ConvergenceError(f"found {RIGID_MODES + len(pairs[0])} of {modes} modes")

@@ -6,10 +6,9 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES, Solid
 from solver.analysis.coarse_start import coarse_start
 from solver.analysis.modal_solver import ModalSolver
@@ -30,8 +29,6 @@ from studies.benchmark.rivals import (
 )
 from studies.benchmark.search import RivalSearch
 from studies.benchmark.solid import BenchmarkSolid
-
-Array = NDArray[np.float64]
 
 CORRECTED_TOLERANCE = 1e-6
 """Eigenvalue error of HCMS with error correction on the fine mesh."""
@@ -134,10 +131,7 @@ class Methods:
 
         Modes that it missed are found off the clock, see `general`.
 
-        Raises
-        ------
-        ConvergenceError
-            If it cannot be tried here, takes too long or fails.
+        Raises ConvergenceError if it cannot be tried here, takes too long or fails.
         """
         rival = RIVALS[name]
         rival.require(self.comm.size)

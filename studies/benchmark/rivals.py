@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.processes.petsc import PETSc
@@ -22,8 +22,6 @@ from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX
 from solver.reference.eigensolver import FEWEST_MORE, SUBSPACE
 from solver.subspace.rayleigh_ritz import rigid_pairs
-
-Array = NDArray[np.float64]
 
 PACKAGES = {"cholmod": "suitesparse", "mumps": "mumps"}
 """Sparse Cholesky factorisations that are tried, and the packages that PETSc has them from."""
@@ -104,10 +102,7 @@ def smallest_without_factor(
     are given: their zeros would never pass ARPACK's test, which is relative to the eigenvalue.
     Copies of other multiple eigenvalues may be missed.
 
-    Raises
-    ------
-    ConvergenceError
-        If too few pairs converge.
+    Raises ConvergenceError if too few pairs converge.
     """
     system = assemble(distribute(model, None, seed, comm), comm)
     rigid_values, rigid = rigid_pairs(system)

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
 from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
-
-Array = NDArray[np.float64]
 
 
 def spectrum_error(values: Array, exact: Array) -> dict[str, float]:

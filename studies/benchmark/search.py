@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.linear import LinearSolver
 from solver.subspace.rayleigh_ritz import safe_shift
 
-Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
 """Eigenvalues (k,) [rad^2/s^2] and vectors (n, k), orthonormal with respect to `RivalSearch.M`."""
 

@@ -94,10 +94,7 @@ def _ends(*numbers: float) -> str:
 def solve(kind: str, search: RivalSearch) -> Pairs:
     """Elastic pairs by an eigensolver of `OPTIONS`.
 
-    Raises
-    ------
-    ConvergenceError
-        If SLEPc was built without it, fails or takes too long.
+    Raises ConvergenceError if SLEPc was built without it, fails or takes too long.
     """
     options = OPTIONS[kind](search)
     generalised = kind not in STANDARD

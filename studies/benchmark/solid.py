@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
 from carillon.fem.materials import smooth_field
@@ -17,8 +15,6 @@ from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.forest import FOREST, ForestCoarsening, forest_or_reason
 from solver.coarsening.model import block_moduli, coarse_model
-
-Array = NDArray[np.float64]
 
 CHANGE = 0.05
 """Largest relative change of a modulus between the two materials."""
@@ -81,11 +77,8 @@ class BenchmarkSolid:
 def make_solid(options: ProblemOptions, modes: int) -> BenchmarkSolid:
     """Discretise the solid and give it both materials.
 
-    Raises
-    ------
-    UserError
-        For anything wrong with the mesh, the material or the forests, or if the fine or the coarse
-        model has fewer unknowns than modes are wanted.
+    Raises UserError for anything wrong with the mesh, the material or the forests, or if the fine
+    or the coarse model has fewer unknowns than modes are wanted.
     """
     problem = build_problem(replace(options, coarsen="none"))
     check_mode_count(modes, problem.model.n_dofs)

@@ -38,10 +38,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import void_patterns
-from carillon.fem.element import Array
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.chen2015 import corner_selection
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
@@ -186,7 +185,7 @@ def coarse_flexibility(moduli: Array, poisson: float) -> Array:
     return np.asarray(np.linalg.inv(matrices))
 
 
-def pattern_rows(young: Array, at_most: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
+def pattern_rows(young: Array, at_most: int) -> Iterator[tuple[int, Index]]:
     """Void patterns of blocks (n, 8) and the rows of each, up to `at_most` together."""
     masks = void_patterns(young)
     for mask in np.unique(masks):
@@ -201,11 +200,8 @@ def pattern_errors(
 ) -> list[Errors]:
     """Errors of several coarsenings of blocks (n, 8) that share one void pattern.
 
-    Parameters
-    ----------
-    coarse
-        For each coarsening either its moduli (n, 8) or the flexibility (n, 18, 18) of its elements
-        in the straining motions.
+    `coarse`: for each coarsening either its moduli (n, 8) or the flexibility (n, 18, 18) of its
+    elements in the straining motions.
     """
     loads = tables_of(mask, poisson).loads
     fine = fine_responses(young, mask, poisson)

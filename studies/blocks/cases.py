@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import void_patterns
-from carillon.fem.element import Array
 from dataset_gen.objectives import orientations
 from dataset_gen.sampling import Mixture, Moduli, moduli, samples
 

@@ -10,11 +10,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import symmetries
-from carillon.fem.element import Array
 
 
-def places(materials: int) -> NDArray[np.int64]:
+def places(materials: int) -> Index:
     """Weight (8, 48) of cell j's material in the key of the block's image under symmetry g."""
     return np.ascontiguousarray(np.int64(materials) ** symmetries().T)
 
@@ -31,7 +31,7 @@ def combinations(materials: int) -> int:
     return total // len(symmetries())
 
 
-def _orbit(image: NDArray[np.int64], cell: int) -> list[int]:
+def _orbit(image: Index, cell: int) -> list[int]:
     orbit = [cell]
     while (cell := int(image[cell])) != orbit[0]:
         orbit.append(cell)
@@ -39,9 +39,7 @@ def _orbit(image: NDArray[np.int64], cell: int) -> list[int]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _least_images(
-    materials: int, weights: NDArray[np.int64], keys: NDArray[np.uint32]
-) -> NDArray[np.uint32]:
+def _least_images(materials: int, weights: Index, keys: NDArray[np.uint32]) -> NDArray[np.uint32]:
     """Keys of the combinations that are the least of their images, ascending, into `keys`."""
     digits = np.zeros(8, dtype=np.int64)
     count = 0

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.arrays import Array
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.numerics.simd import LANES, empty
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.chen2015 import Corners, corners_of

@@ -21,10 +21,11 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from carillon.arrays import Array, Index
 from carillon.command_line.progress import track
 from carillon.errors import UserError
 from carillon.fem.block import symmetries
-from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.files.datasets import INTEGER, number, read, refused
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
@@ -123,6 +124,9 @@ def build(
 ) -> Database:
     """Fit every combination of base materials and choose representatives.
 
+    Raises UserError for materials that do not ascend, are too few or too many, or a bad Poisson's
+    ratio.
+
     Parameters
     ----------
     materials : (m,)
@@ -130,11 +134,6 @@ def build(
     representatives
         How many metamaterials to keep; None keeps all of them. Distances between metamaterials are
         those of their logarithmic moduli.
-
-    Raises
-    ------
-    UserError
-        For materials that do not ascend, are too few or too many, or a bad Poisson's ratio.
     """
     start = time.perf_counter()
     base = np.array(materials, dtype=float)
@@ -165,8 +164,8 @@ def _look_up(
     young: Array,
     bounds: Array,
     void: int,
-    weights: NDArray[np.int64],
-    images: NDArray[np.int64],
+    weights: Index,
+    images: Index,
     keys: NDArray[np.uint32],
     entries: NDArray[np.unsignedinteger],
     moduli: Array,
@@ -219,10 +218,8 @@ def look_up(database: Database, young: ArrayLike) -> Array:
     one where it leaves their range; a void cell stays void, a filled one stays filled. (Nearest
     in value brought larger errors: it rounds soft cells, which matter most, too coarsely.)
 
-    Raises
-    ------
-    UserError
-        See `forests.evaluate.require_blocks`, and for void cells in a database without void.
+    Raises UserError, see `forests.evaluate.require_blocks`, and for void cells in a database
+    without void.
     """
     blocks = require_blocks(young)
     void = int(database.materials[0] == 0.0)
@@ -264,10 +261,7 @@ def save_databases(path: str | Path, databases: Sequence[Database]) -> None:
 def load_databases(path: str | Path) -> list[Database]:
     """Read what `save_databases` wrote.
 
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another kind or schema.
+    Raises UserError if the file is missing, damaged, of another kind or schema.
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         numbers = sorted(int(name) for name in file if name.isdigit())

@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.command_line.progress import track
 from carillon.errors import UserError
-from carillon.fem.element import Array
 
 BOX_POINTS = 128
 """Most points of a box."""
@@ -37,12 +36,12 @@ class Cover(NamedTuple):
         Largest distance of any point from the first 1, 2, .., r representatives.
     """
 
-    chosen: NDArray[np.int64]
-    nearest: NDArray[np.int64]
+    chosen: Index
+    nearest: Index
     radius: Array
 
 
-def _boxes(points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _boxes(points: Array) -> tuple[Index, Index]:
     """Order (n,) that has the points of a box side by side, and where boxes start and end."""
     order = np.arange(len(points))
     starts, pending = [], [(0, len(points))]
@@ -62,12 +61,12 @@ def _boxes(points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 @numba.njit(cache=True, nogil=True)
 def _pick(
     points: Array,
-    bounds: NDArray[np.int64],
+    bounds: Index,
     low: Array,
     high: Array,
     first: int,
-    chosen: NDArray[np.int64],
-    nearest: NDArray[np.int64],
+    chosen: Index,
+    nearest: Index,
     square: Array,
     farthest: Array,
     radius: Array,
@@ -113,10 +112,7 @@ def farthest_points(points: Array, count: int, label: str = "", visible: bool = 
     The first one is the point nearest to the centre of all. There are fewer when so many cover
     every point exactly.
 
-    Raises
-    ------
-    UserError
-        For fewer than one representative.
+    Raises UserError for fewer than one representative.
     """
     if count < 1:
         raise UserError(f"{count} representatives, expected at least 1")

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.errors import UserError
-from carillon.fem.element import Array
 from carillon.files.paths import require_writable
 from carillon.processes.threads import allowed_threads, in_parallel
 from dataset_gen.objectives import closed_form, fit
@@ -68,10 +68,7 @@ def methods_of(models: dict[str, Model]) -> list[Method]:
 
     The objectives fitted on the spot are the paper's, Chen's, and those that the models learned.
 
-    Raises
-    ------
-    UserError
-        See `common_poisson`.
+    Raises UserError, see `common_poisson`.
     """
     poisson = common_poisson(models)
     learned = (closed_form(model.objective) for model in models.values())
@@ -110,17 +107,14 @@ def databases_of(
 ) -> dict[BlockCase, Database]:
     """A database made for each case that is not another one scaled.
 
+    Raises UserError if the file has other databases, or cannot be written.
+
     Parameters
     ----------
     path
         File to read them from; if there is none, they are built and written to it.
     materials
         Base materials of each, void included.
-
-    Raises
-    ------
-    UserError
-        If the file has other databases, or cannot be written.
     """
     bases = {
         case: base_materials(case.moduli, materials, case.void)
@@ -179,10 +173,7 @@ def database_methods(case: BlockCase, databases: dict[BlockCase, Database]) -> l
 def common_poisson(models: dict[str, Model]) -> float:
     """Poisson's ratio of all models.
 
-    Raises
-    ------
-    UserError
-        If there is no model, or they differ.
+    Raises UserError if there is no model, or they differ.
     """
     ratios = {name: model.poisson for name, model in models.items()}
     if not ratios:
@@ -196,10 +187,7 @@ def common_poisson(models: dict[str, Model]) -> float:
 def load_models(paths: Sequence[str] | None) -> dict[str, Model]:
     """Forests by file, or the default ones.
 
-    Raises
-    ------
-    UserError
-        If a file is not a model, or none is named and there are no default forests.
+    Raises UserError if a file is not a model, or none is named and there are no default forests.
     """
     if not paths:
         paths = [str(default_path())]

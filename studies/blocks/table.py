@@ -16,8 +16,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
-from carillon.fem.element import Array
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Number, between
 from carillon.processes.threads import blas_threads
@@ -132,6 +132,8 @@ def table(
 ) -> list[Row]:
     """Rows of Fig. 9 on random blocks of each case, on one core.
 
+    Raises UserError for no model, or models of different Poisson's ratios.
+
     Parameters
     ----------
     models
@@ -148,11 +150,6 @@ def table(
         `mean_squared_m2` (absolute, nodal), `seconds_per_block` (median of `timed_runs`, with
         `seconds_per_block_min` and `_max`), `storage_bytes`, `training_seconds` (None if unknown),
         `clamped` (made for lower moduli than the blocks have), `blocks`, `seed`.
-
-    Raises
-    ------
-    UserError
-        For no model, or models of different Poisson's ratios.
     """
     poisson = common_poisson(models)
     if databases is None:

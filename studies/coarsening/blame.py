@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.geometry import Blocks
 from carillon.fem.model import ElasticModel
 from solver.refinement.energies import element_energies, fine_energies
 from solver.refinement.estimate import error_shares
-
-Array = NDArray[np.float64]
 
 LISTED = 10
 """Elements that are named for each mode."""

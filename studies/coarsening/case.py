@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import ElasticModel
@@ -24,8 +24,6 @@ from solver.refinement.refined_model import RefinedModel
 from studies.coarsening.costs import Taken, as_values, compare_costs, take, timed
 from studies.coarsening.picture_file import ModePicture
 from studies.coarsening.rating import FAR_OFF, CoarseRating, SolvedModel
-
-Array = NDArray[np.float64]
 
 SPARE = MODES_USED - LAST
 """Modes found beyond those that are rated, which may be among them in truth."""
@@ -62,6 +60,8 @@ def rate_coarsening(
     SLEPc finds the modes: the same, one with some blocks fine, or the fine solid. What the default
     method takes, and costs, is told beside it. All of it runs on this rank alone.
 
+    Raises UserError for anything wrong with the solid, or if it has too few unknowns.
+
     Parameters
     ----------
     options
@@ -70,11 +70,6 @@ def rate_coarsening(
         Number of the last mode rated, the six rigid ones included; at most `LAST`.
     timed_modes
         Number of modes computed where the coarse model is chosen and timed; `modes` if not given.
-
-    Raises
-    ------
-    UserError
-        For anything wrong with the solid, or if it has too few unknowns.
     """
     coarsening = options.coarsening()
     if coarsening is None:

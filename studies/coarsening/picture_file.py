@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
 from carillon.files.hdf5 import create_h5, open_h5
 from solver.files.model_group import put
-
-Array = NDArray[np.float64]
 
 KIND = "coarsening pictures"
 SCHEMA = 1
@@ -45,10 +41,7 @@ def write_pictures(
 ) -> None:
     """Write modes on a fine mesh, of which there may be none, with where they come from.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
+    Raises UserError if the file cannot be written.
     """
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         put(file, "grid", mesh.grid, "1", "integer coordinates of the cells")
@@ -66,10 +59,7 @@ def write_pictures(
 def read_pictures(path: str | Path) -> tuple[HexMesh, list[ModePicture]]:
     """The fine mesh and the modes, the worst one first.
 
-    Raises
-    ------
-    UserError
-        If it is no such file, or damaged.
+    Raises UserError if it is no such file, or damaged.
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         mesh = hexmesh_from_grid(file["grid"][:], file.attrs["origin"], file.attrs["cell_edge"])

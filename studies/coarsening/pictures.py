@@ -6,16 +6,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.drawing.solid import VIEW, draw, guess_up, looks_at
 from carillon.fem.geometry import HexMesh
 from studies.base.cases import Case
 from studies.base.media import COLOUR_MAP, cropped, embedded, solid_picture
 from studies.coarsening.picture_file import ModePicture, read_pictures
 from studies.coarsening.results import CoarseningStudy
-
-Array = NDArray[np.float64]
 
 DECADES = 3.0
 """Powers of ten that colours stand for, below the largest share."""
@@ -57,7 +55,7 @@ def best_view(mesh: HexMesh, energy: Array, up: str) -> tuple[float, float]:
     return max(views, key=lambda view: energy[_seen(mesh, view, up)].sum())
 
 
-def _seen(mesh: HexMesh, view: tuple[float, float], up: str) -> NDArray[np.int64]:
+def _seen(mesh: HexMesh, view: tuple[float, float], up: str) -> Index:
     """Cells that no other one hides, told by their middles."""
     eye = looks_at(mesh, np.eye(3), view, up)
     across = np.linalg.svd(eye[None])[2][1:]

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import scipy.stats
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import frequencies
@@ -17,8 +17,6 @@ from solver.verification.errors import frequency_errors
 from solver.verification.matching import SAME, match_modes, mode_overlaps, recognised
 from studies.coarsening.blame import Blame
 from studies.coarsening.picture_file import ModePicture
-
-Array = NDArray[np.float64]
 
 FAR_OFF = 0.10
 """Relative error of a frequency from which a mode is given a verdict."""

@@ -28,10 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare two folders.
 
-    Raises
-    ------
-    UserError
-        If one does not exist or holds no tables, or if they have none in common.
+    Raises UserError if one does not exist or holds no tables, or if they have none in common.
     """
     before, now = read_folder(arguments.before), read_folder(arguments.now)
     out = None if arguments.out is None else require_apart(arguments.out, before, now)

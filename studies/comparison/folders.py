@@ -46,10 +46,7 @@ class Folder:
 def read_folder(path: str | Path) -> Folder:
     """Read all tables of a folder of results.
 
-    Raises
-    ------
-    UserError
-        If there is no such folder, if it holds no tables, or if one cannot be read.
+    Raises UserError if there is no such folder, if it holds no tables, or if one cannot be read.
     """
     path = Path(path)
     tables = {name: _read(file) for name, file in require_tables(path).items()}
@@ -61,10 +58,7 @@ def read_folder(path: str | Path) -> Folder:
 def require_tables(path: str | Path) -> dict[str, Path]:
     """Files of the tables in a folder, by their path below it without ending.
 
-    Raises
-    ------
-    UserError
-        If there are none, or there is no such folder.
+    Raises UserError if there are none, or there is no such folder.
     """
     path = Path(path)
     try:
@@ -86,10 +80,7 @@ def require_tables(path: str | Path) -> dict[str, Path]:
 def require_apart(out: str | Path, *compared: Folder) -> Path:
     """Check that a comparison is not written among the tables compared, one of which it would be.
 
-    Raises
-    ------
-    UserError
-        If it is.
+    Raises UserError if it is.
     """
     out = Path(out)
     if out.resolve() in {(folder.path / part).resolve() for folder in compared for part in PARTS}:

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
@@ -25,8 +25,6 @@ from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver
 from solver.verification.errors import eigenvalue_errors
-
-Array = NDArray[np.float64]
 
 RANDOM = "random"
 STARTS = (*(f"hcms-{interface}" for interface in INTERFACES), RANDOM)
@@ -46,6 +44,9 @@ def correction_history(
     The starts are HCMS with every interface treatment, and random Gaussian vectors,
     orthogonalised, as many as HCMS keeps.
 
+    Raises UserError if there are too few unknowns for so many modes, or `truth` is not of this
+    solid.
+
     Parameters
     ----------
     model
@@ -62,11 +63,6 @@ def correction_history(
     dict[str, Any]
         Plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`,
         `values` (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
-
-    Raises
-    ------
-    UserError
-        If there are too few unknowns for so many modes, or `truth` is not of this solid.
     """
     bcast_from_root(comm, lambda: check_mode_count(modes, cast(Solid, model).n_dofs))
     exact = _exact(model, modes, truth, comm)[RIGID_MODES:]

@@ -9,7 +9,6 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.processes.threads import one_thread
 from sound.clips.targets import Targets
@@ -21,8 +20,6 @@ from sound.design.preparation import DesignProblem, prepare
 from sound.design.simulation import Evaluation
 from sound.project.design import Design
 from sound.project.project import Project
-
-Array = NDArray[np.float64]
 
 CHANGE = 0.05
 """Root mean square change of Phi z between the materials of a warm start."""

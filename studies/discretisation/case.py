@@ -7,8 +7,8 @@ from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem import geometry
@@ -24,8 +24,6 @@ from solver.verification.errors import frequency_errors
 from studies.discretisation.methods import TOLERANCE, TimedSpectrum, Ways, voxel_mesh
 from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, truth_between
 
-Array = NDArray[np.float64]
-
 NOISY = ("random", "noise")
 """Materials whose moduli jump from voxel to voxel."""
 WARM_UP = ProblemOptions("builtin:box", 8)
@@ -39,6 +37,8 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     The material is one function of place, defined by the voxels of `options.resolution`: `uniform`
     and `smooth` are interpolated between their middles, of all others each voxel has a modulus of
     its own, which finite cells of half the resolution see as means.
+
+    Raises UserError for anything wrong with the solid, or if it has too few unknowns.
 
     Parameters
     ----------
@@ -54,11 +54,6 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
     dict[str, Any]
         Plain values: `truth`, see `truth_between`, and `ways`, see `Ways`: unknowns, seconds, and
         errors `against` the `solid` and against its `voxels`.
-
-    Raises
-    ------
-    UserError
-        For anything wrong with the solid, or if it has too few unknowns.
     """
     coarsening = replace(options, coarsen=FOREST).coarsening()
     assert coarsening is not None

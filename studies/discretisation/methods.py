@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Surface
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
@@ -30,11 +29,6 @@ from solver.refinement.model_solver import SolveByOptions
 from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
 from solver.refinement.refine import solve_refined
 from solver.refinement.refined_model import RefinedModel
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Relative error of the eigenvalues that every way corrects to."""
@@ -82,7 +76,7 @@ class Ways:
         Number of modes, rigid ones included.
     """
 
-    surface: trimesh.Trimesh
+    surface: Surface
     name: str
     components: str
     resolution: int
@@ -216,6 +210,6 @@ def scaled(lattice: Grid, factor: float) -> Grid:
     return Grid(np.asarray(lattice.origin), lattice.edge / factor, (nx, ny, nz))
 
 
-def voxel_mesh(surface: trimesh.Trimesh, resolution: int, components: str, name: str) -> HexMesh:
+def voxel_mesh(surface: Surface, resolution: int, components: str, name: str) -> HexMesh:
     """Voxels of a surface, see `carillon.fem.geometry.voxelize`."""
     return hexmesh_from_voxels(voxelize(surface, resolution, components=components, name=name))

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
-from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.numerics.simd import LANES, add_product, empty, load_tile, store_tile
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import PoissonRatio, between

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
-from carillon.fem.element import Array
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from carillon.records import provenance
@@ -178,10 +178,7 @@ def benchmark(options: ForestBenchmarkOptions) -> dict[str, Any]:
     `load_ms` is the median time of loading the model, checks included; `compiled_for` the
     processor that numba compiles for.
 
-    Raises
-    ------
-    UserError
-        See `forests.model.load_model`.
+    Raises UserError, see `forests.model.load_model`.
     """
     path = default_path() if options.forest is None else Path(options.forest)
     blocks = options.blocks

@@ -75,10 +75,7 @@ class ForestsStudySection:
     def check_in(self, run: Configuration) -> None:
         """Check that the data of the default forests suffice.
 
-        Raises
-        ------
-        ParameterError
-            If they do not.
+        Raises ParameterError if they do not.
         """
         data = run.default_forest.dataset
         if self.shards > data.shards:

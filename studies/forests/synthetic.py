@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from forests.layout import FEATURE_BITS, NODE, aligned, pack
 from forests.model import FILLED, HIGH, LOW, RECORD, VOID, Forests, Model
 from forests.scaling import FEATURES, PATTERNS, Features, prepare

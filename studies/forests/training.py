@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.errors import UserError
-from carillon.fem.element import Array
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import LARGEST
 from dataset_gen.generate import generate
@@ -113,10 +113,7 @@ def variants(
 ) -> list[Row]:
     """Trainings of `VARIANTS` with the storage that `training` may take, scored on fresh samples.
 
-    Raises
-    ------
-    UserError
-        For a variant that is not known.
+    Raises UserError for a variant that is not known.
     """
     if unknown := [name for name in names if name not in VARIANTS]:
         raise UserError(f"variant {unknown[0]!r} is unknown, choose from {', '.join(VARIANTS)}")
@@ -136,10 +133,7 @@ def learning_curve(
 ) -> list[Row]:
     """Trainings on about so many rows of the dataset each, scored on fresh samples.
 
-    Raises
-    ------
-    UserError
-        If the dataset has fewer rows than asked for.
+    Raises UserError if the dataset has fewer rows than asked for.
     """
     available = 8 * dataset.count
     if max(rows) > available:
@@ -182,10 +176,7 @@ def as_text(rows: Sequence[Row]) -> str:
 def require_counts(text: str) -> list[int]:
     """Row counts like `1e5,1e6` in ascending order.
 
-    Raises
-    ------
-    UserError
-        If there is anything else.
+    Raises UserError if there is anything else.
     """
     try:
         counts = sorted({int(float(part)) for part in text.split(",")})

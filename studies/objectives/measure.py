@@ -13,8 +13,8 @@ from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
@@ -34,7 +34,6 @@ from solver.verification.errors import AUDIBLE_LAST, frequency_errors
 
 logger = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 
 BASELINES = ("galerkin", "average")
 """Coarsenings without a fit, which every objective is to beat."""

@@ -16,8 +16,8 @@ from typing import Annotated, Any, cast
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.parameters import option, parameters
@@ -34,8 +34,6 @@ from solver.linear.plan import Plan
 from solver.subspace.start import start_block
 from solver.subspace.weyl import CountingLaw
 from solver.verification.residuals import verify
-
-Array = NDArray[np.float64]
 
 MATRIX = 3000
 """Rows of the matrices whose product tells the rate of dgemm."""
@@ -121,6 +119,8 @@ class _MeteredInverse:
 def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, Any]:
     """Measure the phases of `--method auto` on one rank; `seed` is that of the random vectors.
 
+    Raises UserError, see `ModalSolver`; also if the solid is too large to be factorised.
+
     Returns
     -------
     dict[str, Any]
@@ -128,11 +128,6 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, A
         many `runs` medians are taken; `seconds` from moduli to verified modes by
         `ModalSolver.solve`; `phases` by name, see `Phase`; rates of a product of large matrices
         and of a copy (read and written) on all threads.
-
-    Raises
-    ------
-    UserError
-        See `ModalSolver`; also if the solid is too large to be factorised.
     """
     asked = SolverOptions(modes=options.modes, seed=seed)
     solver = ModalSolver(model, asked, MPI.COMM_SELF)

@@ -34,10 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Bring what is missing, and print where it lies.
 
-    Raises
-    ------
-    UserError
-        If a package cannot be had or unpacked.
+    Raises UserError if a package cannot be had or unpacked.
     """
     folder = Path(collect(RecordingsOptions, arguments).out)
     make_folder(folder)

@@ -11,15 +11,13 @@ from typing import Any
 
 import numpy as np
 import soundfile
-from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
+from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
 from sound.clips.wav import read_wav
 from studies.base.table import Row
 from studies.recordings.measurement import MODES, extract
-
-Array = NDArray[np.float64]
 
 RECORDING = "agogo-high"
 """Recording that is written in other formats."""

@@ -28,10 +28,8 @@ def bring(folder: Path) -> list[Path]:
     No rights of root are needed, and nothing is installed. A package is there as a whole or not at
     all.
 
-    Raises
-    ------
-    UserError
-        If this machine has no apt-get or dpkg-deb, a package cannot be had, or not be unpacked.
+    Raises UserError if this machine has no apt-get or dpkg-deb, a package cannot be had, or not be
+    unpacked.
     """
     missing = [package for package in SOUNDS if not (folder / package / CONTROL).is_file()]
     if missing:
@@ -80,10 +78,7 @@ def _bring(package: str, folder: Path) -> None:
 def _run(command: Sequence[str], folder: Path, failed: str, advice: str) -> str:
     """What a program printed.
 
-    Raises
-    ------
-    UserError
-        If it fails: `failed`, what it said last, `advice`.
+    Raises UserError if it fails: `failed`, what it said last, `advice`.
     """
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array, Flags
 
 LOWEST_HERTZ, HIGHEST_SHARE = 40.0, 0.45
 """Lowest frequency of peaks [Hz], and the highest as a share of the sampling rate."""
@@ -45,7 +44,7 @@ class Peaks:
     decibels: Array
     resolution: float
 
-    def missed(self, frequencies: Array) -> NDArray[np.bool_]:
+    def missed(self, frequencies: Array) -> Flags:
         """Which peaks (n,) none of the `frequencies` (m,) [Hz] accounts for."""
         if not len(frequencies):
             return np.ones(len(self.hertz), bool)

@@ -43,20 +43,14 @@ def measure_each(
 ) -> tuple[list[dict[str, Any]], dict[int, str]]:
     """Run `solver scaling ARGUMENTS` on each number of ranks, with one thread a rank.
 
-    Parameters
-    ----------
-    arguments
-        By number of ranks; of a run that measures the ranks it is started on.
+    Raises UserError if there is no mpiexec, or all runs fail.
+
+    `arguments`: by number of ranks; of a run that measures the ranks it is started on.
 
     Returns
     -------
     tuple[list[dict[str, Any]], dict[int, str]]
         What the runs found, and what those that failed said, by number of ranks.
-
-    Raises
-    ------
-    UserError
-        If there is no mpiexec, or all runs fail.
     """
     launcher = shutil.which(LAUNCHER)
     if launcher is None:
@@ -84,10 +78,7 @@ def measure_each(
 def require_ranks(ranks: int, environment: Mapping[str, str] = os.environ) -> None:
     """Check that so many ranks may share the cores of this machine, or of a SLURM job's nodes.
 
-    Raises
-    ------
-    UserError
-        If not.
+    Raises UserError if not.
     """
     nodes = environment.get("SLURM_JOB_NUM_NODES", "1")
     cores = allowed_cores() * (int(nodes) if nodes.isdecimal() else 1)

@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.processes.memory import reuse_freed_memory
 from solver.analysis.bounds import check_mode_count, default_keep
@@ -26,8 +26,6 @@ from solver.distribution.local_mesh import distribute
 from solver.hcms.counts import Tally
 from solver.hcms.synthesis import make_subdomains, synthesize
 from solver.linear import Inverse, LinearSolver
-
-Array = NDArray[np.float64]
 
 REPEATS = 3
 """Runs of which the fastest is reported: what else runs on the machine only slows them."""
@@ -44,6 +42,8 @@ def measure(
 
     A first run on few modes compiles what needs compiling; then the fastest of `REPEATS` counts.
 
+    Raises UserError if there are too few unknowns for so many modes, or more ranks than subdomains.
+
     Returns
     -------
     dict[str, Any]
@@ -51,11 +51,6 @@ def measure(
         flops, bytes and messages; `seconds` of all but the partition, `peak_memory_bytes` of each
         rank, `link` (latency [s], bandwidth [B/s] between two ranks; None on one), sizes, ranks and
         cores.
-
-    Raises
-    ------
-    UserError
-        If there are too few unknowns for so many modes, or more ranks than subdomains.
     """
     bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
     reuse_freed_memory()

@@ -66,6 +66,8 @@ def scaling_study(
 ) -> Result:
     """Run on every number of ranks, fit the model, and predict.
 
+    Raises UserError for anything wrong with the solid, or if all runs fail.
+
     Parameters
     ----------
     options
@@ -78,11 +80,6 @@ def scaling_study(
     Result
         Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said
         by those that `failed`, and `model`.
-
-    Raises
-    ------
-    UserError
-        For anything wrong with the solid, or if all runs fail.
     """
     require_ranks(max(scaling.ranks))
     problem = build_problem(options)

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.files.yaml_input import read_own_yaml
 from studies.sounds import examples as sounds
 from studies.sounds.examples import DESIGN
 from workflow.arguments import options
 
-Array = NDArray[np.float64]
 Entry = dict[str, Any]
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")

@@ -10,14 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.files.yaml_input import read_own_yaml
 from workflow.arguments import options
 from workflow.settings import located
-
-Array = NDArray[np.float64]
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")
 FOLDER = "sound"

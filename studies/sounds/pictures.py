@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.drawing.solid import guess_up, looks_at, view_of
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
 from sound.project.design import Design
 from studies.base.colours import COLOURS
 from studies.base.media import COLOUR_MAP, Pixels, cropped, marked_picture
 from studies.sounds.plots import limits
-
-Array = NDArray[np.float64]
 
 POINT_CLASSES = ("random", "hcms_ec", "ddfem_slepc", "ddfem_hcms_ec")
 """Styles of the struck points, in turn."""

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.response.response import spectrogram
-
-Array = NDArray[np.float64]
 
 CENTRES = 1e3 * 10.0 ** (np.arange(-10, 13) / 10.0)
 """Centres of third-octave bands from 100 Hz to 16 kHz [Hz]."""
@@ -22,17 +20,14 @@ def log_spectral_distance(sound: Array, target: Array, rate: int) -> float:
     lasts.  What is below `FLOOR_DECIBELS` counts as just there; where both sounds are, nothing is
     compared.  A gain common to both sounds changes nothing, a gain of one does.
 
+    Raises ValueError if the target is silent.
+
     Parameters
     ----------
     sound, target : (s,), (t,)
         Samples; silence follows a sound that is shorter than its target.
     rate : int [Hz]
         Samples per second of both.
-
-    Raises
-    ------
-    ValueError
-        If the target is silent.
     """
     reference = _band_powers(target, rate)
     loudest = float(reference.max(initial=0.0))

@@ -46,10 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
 def digest(path: Path) -> str:
     """SHA-256 of the datasets and attributes of an HDF5 file, but for its circumstances.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be read, is no result, or does not match the checksum it begins with.
+    Raises UserError if the file cannot be read, is no result, or does not match the checksum it
+    begins with.
     """
     checksum = hashlib.sha256()
 

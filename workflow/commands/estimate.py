@@ -63,10 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the estimate.
 
-    Raises
-    ------
-    UserError
-        For a bad configuration or bad results, or if a mesh cannot be read.
+    Raises UserError for a bad configuration or bad results, or if a mesh cannot be read.
     """
     preset = CONFIGURATIONS / f"{arguments.preset or DEFAULT_PRESET}.yaml"
     path = preset if arguments.configfile is None else Path(arguments.configfile)
@@ -90,9 +87,6 @@ def run(arguments: argparse.Namespace) -> int:
 def load(path: Path, objective: str | None = None) -> dict[str, Any]:
     """A configuration with its defaults; meshes may be absent.
 
-    Raises
-    ------
-    UserError
-        If it cannot be read, or holds anything that does not fit.
+    Raises UserError if it cannot be read, or holds anything that does not fit.
     """
     return settings.complete([path], {"dataset": {"objective": objective}} if objective else {})

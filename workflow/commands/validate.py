@@ -109,10 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Validate one solid; returns the exit status.
 
-    Raises
-    ------
-    UserError
-        If the solid cannot be made, or the run fails.
+    Raises UserError if the solid cannot be made, or the run fails.
     """
     config = configuration(arguments)
     completed(config)

@@ -86,10 +86,8 @@ class DatasetSection:
     def check_in(self, run: Configuration) -> None:
         """Check the ranges, and that every shard has samples.
 
-        Raises
-        ------
-        ParameterError
-            If a range is of no distribution in use or is none, or shards would be empty.
+        Raises ParameterError if a range is of no distribution in use or is none, or shards would be
+        empty.
         """
         for name, (low, high) in self.ranges.items():
             if name not in self.distributions:

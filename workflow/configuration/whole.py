@@ -40,10 +40,7 @@ def limits() -> dict[str, JobLimits]:
 def completed(values: Values) -> dict[str, Any]:
     """A configuration with its defaults, from what is given.
 
-    Raises
-    ------
-    ParameterError
-        With one sentence about the first value that does not fit.
+    Raises ParameterError with one sentence about the first value that does not fit.
     """
     run = parameters_from(values, whole())
     _check_in(run, run, ())

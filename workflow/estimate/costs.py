@@ -108,10 +108,7 @@ def load_medians(folders: Iterable[str | Path] = ()) -> pd.DataFrame:
 
     Those of former results in `folders` replace the packaged ones.
 
-    Raises
-    ------
-    UserError
-        If a folder holds no results of a run.
+    Raises UserError if a folder holds no results of a run.
     """
     packaged = pd.read_csv(PACKAGED, index_col="kind")
     own = [_finished_jobs(Path(folder)) for folder in folders]
@@ -214,10 +211,7 @@ def option_sizes(command: str) -> dict[str, float]:
 def unknowns(mesh: str, resolution: int) -> float:
     """Unknowns of a solid on `resolution` voxels along its longest side, from a coarse count.
 
-    Raises
-    ------
-    UserError
-        If the file of the mesh cannot be read.
+    Raises UserError if the file of the mesh cannot be read.
     """
     if not mesh.startswith(BUILTIN_PREFIX) and not Path(mesh).is_file():
         return TYPICAL * resolution**3

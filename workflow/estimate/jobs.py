@@ -33,17 +33,14 @@ def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = Non
     and `cores`; `memory_mb` and `minutes`, the limits if there are any; `command` (of a shell, or
     empty); `outputs` and `benchmark`, its files below the folder `results`.
 
+    Raises UserError if the rules do not accept the configuration.
+
     Parameters
     ----------
     cores_per_node
         What jobs of a cluster get, unless the configuration says.
     cores
         All cores, which several ranks may share; more than those of a node on a cluster.
-
-    Raises
-    ------
-    UserError
-        If the rules do not accept the configuration.
     """
     values = copy.deepcopy(dict(config)) | {"results_dir": RESULTS, "baseline": None}
     cores = cores or cores_per_node
