@@ -30,10 +30,7 @@ SampleRate = Annotated[int, between(LOWEST_RATE, HIGHEST_RATE)]
 def require_level(peak: float) -> None:
     """Refuse a clip whose loudest sample has an impossible magnitude.
 
-    Raises
-    ------
-    UserError
-        If `peak` is not within `QUIETEST` and `LOUDEST`.
+    Raises UserError if `peak` is not within `QUIETEST` and `LOUDEST`.
     """
     if peak > LOUDEST:
         raise UserError(
@@ -49,10 +46,7 @@ def require_level(peak: float) -> None:
 def require_length(seconds: float, rate: int) -> None:
     """Refuse a length without a sample, or of more than `MOST_SAMPLES`.
 
-    Raises
-    ------
-    UserError
-        If it is such a length.
+    Raises UserError if it is such a length.
     """
     count = seconds * rate
     if not 0.5 < count <= MOST_SAMPLES:

@@ -12,19 +12,10 @@ from carillon.files.paths import require_writable
 def require_output(
     path: str | Path, endings: Iterable[str], inputs: Iterable[str | Path] = ()
 ) -> Path:
-    """Check, before the work, that `path` can be written and has one of the endings.
+    """Check, before the work, that `path` can be written and has one of the endings (`.wav`).
 
-    Parameters
-    ----------
-    endings
-        Endings with their dots, in lower case; capitals count as the same.
-    inputs
-        Files that the command reads and must not replace.
-
-    Raises
-    ------
-    UserError
-        If the name has another ending or is an input's, or no file can be written there.
+    Raises UserError if it has another one, capitals aside, or is that of one of the command's
+    inputs, or no file can be written there.
     """
     suffix = Path(path).suffix
     if suffix.lower() not in endings:

@@ -1,30 +1,24 @@
-"""Struck points of a surface."""
+"""The struck surface, that of a mesh refined to have a vertex near every point, and its points."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index, Surface
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from solver.response.vertices import inward_normals
-from sound.surface import longest_side
-
-if TYPE_CHECKING:  # Its import takes long, and most of the room needs no surface.
-    import trimesh
-
 
 OFF_SURFACE = 1e-3
 """Distance from the surface, over the surface's longest side, from which it is told that a point is
 moved: coordinates are rounded."""
 OFF_VERTEX = 0.05
 """Distance from the nearest vertex, over the longest side, from which that is told: more than any
-point of `sound.surface.struck_surface` is from one."""
+point of `sound.strikes.struck_surface` is from one."""
 TOO_FAR = 0.5
 """Distance from the surface, over the longest side, beyond which a point is a mistake."""
 OTHER_UNITS = (1e-3, 1e3, 1e-2, 1e2, 0.0254, 1.0 / 0.0254)
@@ -33,24 +27,16 @@ NEAR_IN_OTHER_UNIT = 0.02
 """Distance from the surface, over the longest side, that shows a point to be in another unit."""
 SAME_PLACE = 1e-6
 """Distance, over the longest side, within which two vertices are at one place."""
+LONGEST_EDGE = 1.0 / 16.0
+"""Greatest length of an edge, over the surface's longest side; longer edges are halved."""
 
 
 @dataclass(frozen=True)
 class Strike:
-    """A named point of the surface that is struck.
+    """A struck vertex of the surface, with the name of the target whose clip is to sound there.
 
-    Attributes
-    ----------
-    name : str
-        Of the target whose clip is to sound there.
-    vertex : int
-        Number of the surface's vertex.
-    position : (3,) [m]
-        Of that vertex.
-    inward : (3,)
-        Unit vector into the solid.
-    distance : float [m]
-        Between that vertex and the position that was named; 0 if none was.
+    The vertex has a position (3,) [m] and a unit vector `inward` (3,) into the solid; `distance`
+    [m] is that from the position that was named, 0 if none was.
     """
 
     name: str
@@ -69,37 +55,23 @@ class Place:
     vertex: int | None = None
 
 
-def locate_all(
-    surface: trimesh.Trimesh, places: Sequence[Place], unit: float = 1.0
-) -> list[Strike]:
+def locate_all(surface: Surface, places: Sequence[Place], unit: float = 1.0) -> list[Strike]:
     """The vertices that are struck for some targets, and the directions into the solid there.
 
-    A line of progress tells how far a position is off the surface.
-
-    Parameters
-    ----------
-    surface
-        Triangles in metres; vertices may be repeated, and triangles may face either way.
-    places
-        Where the targets are struck.
-    unit : float [m]
-        Metres per unit of the mesh's own coordinates.
-
-    Raises
-    ------
-    UserError
-        With a sentence for each target whose position is further than `TOO_FAR` from the surface or
-        whose vertex is not there, and for any two at one place.
+    A line of progress tells how far a position is off the surface.  Vertices of this, in metres,
+    may be repeated, and triangles may face either way; `unit` [m] is that of the mesh's own
+    coordinates.  Raises UserError with a sentence for each target whose position is further than
+    `TOO_FAR` from the surface or whose vertex is not there, and for any two at one place.
     """
     vertices, side = np.asarray(surface.vertices, dtype=float), longest_side(surface)
-    found: list[tuple[str, int, float]] = []
+    struck: list[tuple[str, int, float]] = []
     faults: list[str] = []
     for place in places:
         try:
-            found.append((place.name, *vertex_of(surface, place, unit)))
+            struck.append((place.name, *vertex_of(surface, place, unit)))
         except UserError as error:
             faults.append(str(error))
-    for (one, first, _), (other, second, _) in combinations(found, 2):
+    for (one, first, _), (other, second, _) in combinations(struck, 2):
         if np.linalg.norm(vertices[first] - vertices[second]) <= SAME_PLACE * side:
             at = _shown(vertices[first] / unit, unit)
             faults.append(
@@ -108,15 +80,15 @@ def locate_all(
             )
     if faults:
         raise UserError(*faults)
-    positions = vertices[[number for _, number, _ in found]]
+    positions = vertices[[number for _, number, _ in struck]]
     inward = inward_normals(surface, positions)
     return [
         Strike(name, number, position, normal, distance)
-        for (name, number, distance), position, normal in zip(found, positions, inward)
+        for (name, number, distance), position, normal in zip(struck, positions, inward)
     ]
 
 
-def vertex_of(surface: trimesh.Trimesh, place: Place, unit: float) -> tuple[int, float]:
+def vertex_of(surface: Surface, place: Place, unit: float) -> tuple[int, float]:
     """Number of the vertex at a place, and its distance from the point named [m]."""
     if (place.at is None) == (place.vertex is None):
         raise UserError(f"target {place.name!r}: expected either a position or a vertex")
@@ -137,9 +109,7 @@ def vertex_of(surface: trimesh.Trimesh, place: Place, unit: float) -> tuple[int,
     return place.vertex, 0.0
 
 
-def _nearest_vertex(
-    surface: trimesh.Trimesh, name: str, at: Array, unit: float
-) -> tuple[int, float]:
+def _nearest_vertex(surface: Surface, name: str, at: Array, unit: float) -> tuple[int, float]:
     """Number of the vertex nearest to the point `at` [mesh unit], and its distance [m]."""
     point = f"target {name!r}: the point {_shown(at, unit)}"
     if not np.isfinite(at).all():
@@ -165,8 +135,7 @@ def _nearest_vertex(
     return nearest, distance
 
 
-def _distance(surface: trimesh.Trimesh, point: Array) -> float:
-    """Distance [m] of a point (3,) [m] from the surface."""
+def _distance(surface: Surface, point: Array) -> float:
     import igl
 
     vertices = np.ascontiguousarray(surface.vertices, dtype=float)
@@ -174,7 +143,7 @@ def _distance(surface: trimesh.Trimesh, point: Array) -> float:
     return float(np.sqrt(igl.point_mesh_squared_distance(point[None], vertices, faces)[0][0]))
 
 
-def _other_unit(surface: trimesh.Trimesh, point: Array) -> str:
+def _other_unit(surface: Surface, point: Array) -> str:
     """Words to add on a point (3,) [m] that would be on the surface in another unit, or nothing."""
     side = longest_side(surface)
     for factor in OTHER_UNITS:
@@ -186,6 +155,58 @@ def _other_unit(surface: trimesh.Trimesh, point: Array) -> str:
 
 
 def _shown(point: Array, unit: float) -> str:
-    """A point (3,) [mesh unit] and its unit."""
     numbers = ", ".join(f"{x:.4g}" for x in point)
     return f"({numbers}) {'m' if unit == 1.0 else 'mesh units'}"
+
+
+def struck_surface(mesh: str, unit: float = 1.0) -> Surface:
+    """Surface of a mesh in metres, without edges above `LONGEST_EDGE` of its longest side.
+
+    The mesh's own vertices come first and keep their numbers; `carillon.fem.geometry.load_surface`
+    describes it and its unit.  Raises UserError if there is no such mesh.
+    """
+    import trimesh
+
+    from carillon.fem.geometry import load_surface
+
+    surface = load_surface(mesh, unit)
+    longest = LONGEST_EDGE * longest_side(surface)
+    vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+    return trimesh.Trimesh(*_cut(vertices, faces, longest), process=False)
+
+
+def longest_side(surface: Surface) -> float:
+    """Longest side [m] of the bounding box."""
+    return float(np.max(surface.extents))
+
+
+def _cut(vertices: Array, faces: Index, longest: float) -> tuple[Array, Index]:
+    """Halve edges longer than `longest` in all triangles that share them, until there are none."""
+    while True:
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
+        sides = np.sort(ends.reshape(-1, 2), axis=1)
+        edges, of_sides = np.unique(sides, axis=0, return_inverse=True)
+        first, second = vertices[edges[:, 0]], vertices[edges[:, 1]]
+        long = np.linalg.norm(second - first, axis=1) > longest
+        if not long.any():
+            return vertices, faces
+        middles = np.full(len(edges), -1)
+        middles[long] = len(vertices) + np.arange(np.count_nonzero(long))
+        vertices = np.concatenate([vertices, (first + second)[long] / 2.0])
+        faces = _with_middles(faces, middles[of_sides].reshape(-1, 3))
+
+
+def _with_middles(faces: Index, middles: Index) -> Index:
+    """Triangles (t, 3) cut at the middles (t, 3) of their sides 01, 12 and 20, -1 where uncut."""
+    parts = [faces[(middles < 0).all(axis=1)]]
+    for turn in range(3):
+        (a, b, c), (ab, bc, ca) = (np.roll(x, -turn, axis=1).T for x in (faces, middles))
+        one = (ab >= 0) & (bc < 0) & (ca < 0)
+        two = (ab >= 0) & (bc >= 0) & (ca < 0)
+        three = (ab >= 0) & (bc >= 0) & (ca >= 0)
+        parts += [np.stack(part, axis=1)[one] for part in ((a, ab, c), (ab, b, c))]
+        parts += [np.stack(part, axis=1)[two] for part in ((ab, b, bc), (a, ab, bc), (a, bc, c))]
+        parts.append(np.stack((a, ab, ca), axis=1)[three])
+        if turn == 0:
+            parts.append(np.stack((ab, bc, ca), axis=1)[three])
+    return np.concatenate(parts)

@@ -23,14 +23,8 @@ _LENGTH = struct.Struct("<I")
 
 
 def pack(header: Mapping[str, Any], arrays: Mapping[str, tuple[str, Any]]) -> bytes:
-    """A binary message.
-
-    Parameters
-    ----------
-    header
-        What is told beside the arrays, fit for JSON.
-    arrays
-        By name: type (see `TYPES`) and values.
+    """A binary message of a header, fit for JSON, and arrays by name: type (see `TYPES`) and
+    values.
 
     Examples
     --------

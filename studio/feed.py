@@ -1,11 +1,11 @@
-"""Messages to one page, in order, without a backlog: of what only the newest counts, it is sent."""
+"""Messages to pages, in order, without a backlog: of what only the newest counts, it is sent."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import count
 from typing import Any
 
@@ -34,19 +34,9 @@ class Feed:
         self._changed = asyncio.Event()
         self.closed = False
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing waits to be sent."""
-        return not self._waiting
-
     def put(self, message: Message, newest: str | None = None) -> None:
-        """Add a message.
-
-        Parameters
-        ----------
-        newest
-            Name of a kind of messages of which only the newest counts: one of them that still
-            waits is dropped.  None for messages that all count.
+        """Add a message; of those of one kind `newest` only the newest counts, and one that waits
+        is dropped.
         """
         if self.closed:
             return
@@ -78,9 +68,61 @@ class Feed:
 def as_json(value: Any) -> str:
     """A value as JSON of the strict kind, which browsers read.
 
-    Raises
-    ------
-    ValueError
-        If there is a number in it that JSON does not have: an infinite one, or none.
+    Raises ValueError if there is a number in it that JSON does not have: an infinite one, or none.
     """
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+class Pages:
+    """Feeds of all pages; `state` and `history` make the events of these names, which a new page is
+    told first.
+    """
+
+    def __init__(
+        self, state: Callable[[], dict[str, Any]], history: Callable[[], dict[str, Any]]
+    ) -> None:
+        self._state, self._history = state, history
+        self._bank: bytes | None = None
+        self._feeds: set[Feed] = set()
+
+    def subscribe(self) -> Feed:
+        """A feed that begins with all that there is."""
+        feed = Feed()
+        self._feeds.add(feed)
+        feed.send(self._state(), "state")
+        feed.send(self._history())
+        if self._bank is not None:
+            feed.put(self._bank, "bank")
+        return feed
+
+    def unsubscribe(self, feed: Feed) -> None:
+        """Send nothing more to a feed."""
+        self._feeds.discard(feed)
+
+    def close(self) -> None:
+        """End all feeds."""
+        for feed in self._feeds:
+            feed.close()
+
+    def tell(self, event: Mapping[str, Any], newest: str | None = None) -> None:
+        """Tell an event; parameters as for `Feed.send`."""
+        for feed in self._feeds:
+            feed.send(event, newest)
+
+    def tell_state(self) -> None:
+        """Tell the state as it is now."""
+        self.tell(self._state(), "state")
+
+    def tell_history(self) -> None:
+        """Tell the history as it is now."""
+        self.tell(self._history())
+
+    def tell_bank(self, bank: bytes) -> None:
+        """Tell what the solid sounds like."""
+        self._bank = bank
+        for feed in self._feeds:
+            feed.put(bank, "bank")
+
+    def say(self, text: str, kind: str = "note") -> None:
+        """Tell a sentence, a `note` or an `error`."""
+        self.tell({"event": "said", "text": text, "kind": kind})

@@ -21,14 +21,8 @@ class NotFoundError(UserError):
 
 @dataclass(frozen=True)
 class Download:
-    """A file for the browser to save.
-
-    Attributes
-    ----------
-    name
-        Proposed to the person, with its ending.
-    media_type
-        As in HTTP: `audio/wav`.
+    """A file for the browser to save: the name that is proposed, with its ending, and the media
+    type as in HTTP, `audio/wav`.
     """
 
     name: str

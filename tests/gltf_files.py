@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sound.export.gltf_buffer import UNSIGNED_INT
+from sound.export.gltf import UNSIGNED_INT
 
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 

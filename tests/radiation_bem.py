@@ -24,8 +24,8 @@ from carillon.fem.model import RIGID_MODES, fine_model
 from solver.analysis.library import solve
 from solver.response.points import interpolation
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, radiated
-from sound.scenes.shape import Shape
-from sound.surface import struck_surface
+from sound.scenes.bodies import Shape
+from sound.strikes import struck_surface
 
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]

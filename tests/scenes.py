@@ -5,11 +5,9 @@ from typing import Any
 
 import pytest
 
-from sound.scenes.bodies import bodies_of
-from sound.scenes.body import Body
+from sound.scenes.bodies import Body, bodies_of
 from sound.scenes.contact.engine import Course, GroundPlane, simulate
-from sound.scenes.contact.impacts import HertzImpact, SustainedContact, split_impacts
-from sound.scenes.contact.touch import Touch
+from sound.scenes.contact.impacts import HertzImpact, SustainedContact, Touch, split_impacts
 from sound.scenes.scene import Scene, scene_of
 
 QUIET = {"radiation": False, "space": False, "contact_damping": False, "noise": False}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from sound.scenes.playing.impact_list import COLUMNS
+from sound.scenes.performance import COLUMNS
 from sound.scenes.playing.tune import BEAT_SECONDS, tune_of
 from studio.__main__ import main
 from tests.scenes import require_engine, struck

@@ -13,7 +13,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry import builtin_surface
 from sound.scenes import convex, cuttable
 from sound.scenes.convex import MOST_VERTICES, convex_parts
-from sound.surface import struck_surface
+from sound.strikes import struck_surface
 from tests.edited_files import edited
 
 POINTS = 20_000

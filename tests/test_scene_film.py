@@ -13,8 +13,7 @@ from carillon.errors import UserError
 from sound.scenes.film.film import FORMATS, write_film
 from sound.scenes.film.frames import Stage
 from sound.scenes.film.rays import PlacedSurface, RayedSurface, corner_normals
-from sound.scenes.performance import Performance
-from sound.scenes.picture import Appearance, Camera, Motion, Picture
+from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture
 from tests.disks import KIB, disk_on
 
 SIZE = (160, 90)

@@ -11,8 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from sound.export.scene_gltf import EXTENSION, write_scene_gltf
-from sound.scenes.performance import Performance
-from sound.scenes.picture import Appearance, Camera, Motion, Picture
+from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture
 from tests.gltf_files import accessor, read_gltf
 
 STEPS, RATE = 41, 8000

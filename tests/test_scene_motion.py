@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from carillon.errors import UserError
 from sound.scenes.contact import engine
-from sound.scenes.contact.bounce import damping_ratio, restitution_of
+from sound.scenes.contact.engine import damping_ratio, restitution_of
 from sound.scenes.hertz import approach, bounce_seconds, stiffness
 from sound.scenes.performance import GROUND
 from tests.scenes import ball, moved, require_engine, scene, struck

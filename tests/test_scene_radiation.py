@@ -7,12 +7,12 @@ from scipy.signal import freqz, lfilter
 from scipy.spatial.transform import Rotation
 from scipy.special import spherical_jn, spherical_yn
 
-from sound.scenes.audible.acceleration_noise import (
+from sound.scenes.audible.loudness import (
     acceleration_filter,
     equivalent_radius,
 )
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, Radiation, radiated
-from sound.scenes.shape import Shape
+from sound.scenes.bodies import Shape
 from tests.radiation_bem import approximate_power, level, sphere_pressure, vibrating_solid
 
 RADIUS = 0.05

@@ -11,13 +11,13 @@ from sound.project.design_file import write_design
 from sound.rendering.render import Hit, render
 from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
 from sound.scenes.audible.radiation import SOUND_SPEED
-from sound.scenes.audible.roughness import octave_heights, profile
+from sound.scenes.audible.sustained_contact import octave_heights, profile
 from sound.scenes.bodies import bodies_of
-from sound.scenes.picture import Motion
+from sound.scenes.performance import Motion
 from sound.scenes.playing.play import perform
-from sound.synthesis.bank import Bank
-from sound.synthesis.bank import ring as ring_bank
 from sound.synthesis.driven import BLOCK, Excitation, ring
+from sound.synthesis.sinusoids import Bank
+from sound.synthesis.sinusoids import ring as ring_bank
 from tests.scenes import QUIET, ball, require_engine, scene, struck
 from tests.small_design import small_design
 

@@ -5,8 +5,8 @@ import pytest
 
 from sound.scenes.bodies import bodies_of
 from sound.scenes.film.rays import View
-from sound.scenes.picture import Camera, Motion
-from sound.scenes.playing.viewpoint import ASPECT, camera_of, head_of
+from sound.scenes.performance import Camera, Motion
+from sound.scenes.playing.play import ASPECT, camera_of, head_of
 from tests.scenes import ball, scene
 
 HEIGHT = 720

@@ -8,7 +8,7 @@ import pytest
 from carillon.errors import ConvergenceError
 from sound.design import pool
 from sound.design.descent import DescentLimits, cost_of
-from sound.design.gauss_newton import StepOptions
+from sound.design.local_search import StepOptions
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.pool import Pool

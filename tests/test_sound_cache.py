@@ -9,7 +9,6 @@ import pytest
 
 from carillon.errors import UserError
 from carillon.files import cache
-from sound.clips import cache as clips
 from sound.clips import files
 from sound.clips.extraction import ModalSound, extract
 from sound.clips.files import extract_file
@@ -66,7 +65,7 @@ def test_another_search_is_another_entry(clip, folder, searches, monkeypatch):
     extract_file(clip)
     assert len(extract_file(clip, 1).frequencies) == 1
     extract_file(written(clip, 450.0))
-    monkeypatch.setattr(clips, "_origin", lambda: b"other code")
+    monkeypatch.setattr(files, "_origin", lambda: b"other code")
     extract_file(clip)
     assert len(searches) == 4 == len(list(folder.iterdir()))
 

@@ -13,13 +13,13 @@ from solver.analysis.problem import ProblemOptions
 from solver.assembly.sparse import assembled
 from solver.distribution.partition import partition_cells
 from sound.__main__ import main
-from sound.design.damping import fitted_loss_factors
 from sound.design.material import ReducedMaterial
 from sound.design.optimise import optimise
+from sound.design.outcome import fitted_loss_factors
 from sound.design.preparation import prepare
 from sound.design.simulation import Simulation
+from sound.project.design import MaterialDamping
 from sound.project.design_file import read_design, write_design
-from sound.project.material_damping import MaterialDamping
 from sound.rendering.solid import SoundingSolid
 from tests import small_project
 from tests.small_design import N_MODES, small_design

@@ -21,8 +21,7 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from sound.design.objective import DesignCost, Objective
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
-from sound.design.outcome import Outcome
-from sound.design.plausible import weight
+from sound.design.outcome import Outcome, weight
 from sound.design.pool import Pool
 from sound.design.preparation import coordinates_of, prepare, targets_of
 from sound.design.search import HistoryEntry

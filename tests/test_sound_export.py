@@ -22,7 +22,7 @@ from sound.export.gltf import EXTENSION
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
-from sound.synthesis.bank import Bank, ring
+from sound.synthesis.sinusoids import Bank, ring
 from tests.gltf_files import accessor, read_gltf
 from tests.programs import run
 from tests.small_design import N_MODES, SIDES, small_design

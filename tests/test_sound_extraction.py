@@ -5,16 +5,14 @@ import pytest
 import soundfile
 
 from carillon.errors import UserError
-from sound.clips.clipping import is_clipped
-from sound.clips.ending import ending
-from sound.clips.esprit import esprit
+from sound.clips.candidates import esprit
+from sound.clips.extent import ending, second_strike, strike_sample
 from sound.clips.extraction import ModalSound, extract
-from sound.clips.free_vibration import LONGEST_BLOW
+from sound.clips.free_vibration import LONGEST_BLOW, is_clipped
 from sound.clips.glide import glide
 from sound.clips.instruments import synthesised
 from sound.clips.least_squares import fitted_coefficients, normal_matrix, refined
-from sound.clips.onset import second_strike, strike_sample
-from sound.clips.pursuit import further
+from sound.clips.mode_search import further
 from sound.clips.wav import read_wav
 from sound.synthesis.sinusoids import correlations, damped_sinusoids, exponents_of
 

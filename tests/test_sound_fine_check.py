@@ -13,11 +13,11 @@ from carillon.errors import ConvergenceError
 from carillon.fem.model import fine_model
 from solver import solve
 from sound.__main__ import main
-from sound.design.cents import cents, common_factor, rms_cents
 from sound.design.descent import Descent
 from sound.design.fine_check import ShapeMatch, fine_frequencies
 from sound.design.optimise import optimise
 from sound.design.outcome import Outcome
+from sound.design.pitch import cents, common_factor, rms_cents
 from sound.design.preparation import prepare
 from sound.design.reduced_model import ReducedModel, descend_by_model
 from sound.design.space_mapping import MET_CENTS

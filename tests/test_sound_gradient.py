@@ -8,11 +8,10 @@ from carillon.fem.geometry import hexmesh_from_grid
 from solver.analysis.problem import ProblemOptions
 from solver.assembly.sparse import assembled
 from sound.clips.targets import Targets
-from sound.design.bark import bark, bark_slope
-from sound.design.material import LAWS, ReducedMaterial
+from sound.design.material import LAWS, FreePoisson, ReducedMaterial
 from sound.design.modal_truncation import lies_between, shift_between
 from sound.design.objective import Objective
-from sound.design.poisson import FreePoisson
+from sound.design.pitch import bark, bark_slope
 from sound.design.simulation import Simulation
 from sound.project.settings import Weights
 from sound.strikes import Strike

@@ -23,7 +23,7 @@ from sound.project.design_file import write_design
 from sound.rendering.listening import Listening, resampled
 from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
-from sound.synthesis.bank import Bank, ring
+from sound.synthesis.sinusoids import Bank, ring
 from tests.small_design import N_MODES, small_design
 from tests.solids import uniform_box
 

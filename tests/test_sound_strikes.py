@@ -7,8 +7,7 @@ import trimesh
 from carillon.errors import UserError
 from carillon.fem.geometry import BUILTINS, builtin_surface
 from solver.response.vertices import inward_normals
-from sound.strikes import Place, Strike, locate_all
-from sound.surface import struck_surface
+from sound.strikes import Place, Strike, locate_all, struck_surface
 from tests.mesh_files import inside_out, soup, with_turned
 
 PAN = "builtin:frying-pan"

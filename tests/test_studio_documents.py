@@ -9,8 +9,15 @@ import yaml
 
 from carillon.errors import UserError
 from sound.project.project import load_project
-from studio.session.document import Document, Material, Target, document_of, merged
-from studio.session.history import LONGEST, History
+from studio.session.document import (
+    LONGEST,
+    Document,
+    History,
+    Material,
+    Target,
+    document_of,
+    merged,
+)
 from studio.session.workspace import Workspace
 
 BELL = Document({"mesh": "builtin:bell", "resolution": 8})
@@ -140,4 +147,4 @@ def test_projects_are_listed_without_what_is_the_studio_s_own(workspace):
     (workspace.folder / "folder.yaml").mkdir()
     assert workspace.projects() == ["a", "b"]
     assert yaml.safe_load((workspace.folder / "a.yaml").read_text())["resolution"] == 8
-    assert Path(workspace.design("a")).name == "a.h5"
+    assert Path(workspace.path("a.h5")).name == "a.h5"

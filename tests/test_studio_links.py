@@ -14,7 +14,7 @@ from carillon.files.atomic import atomic_path
 from sound.project.design_file import write_design
 from studio.server import browser
 from studio.session import open_studio
-from studio.session.designs import save
+from studio.session.projects import save
 from studio.session.workspace import OWN_FOLDER
 from tests.edited_files import edited
 from tests.small_design import small_design

@@ -10,8 +10,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from carillon.parameters.schema import schema_of
-from sound.design.bark import bark as bark_of
-from sound.design.cents import cents as cents_of
+from sound.design.pitch import bark as bark_of
+from sound.design.pitch import cents as cents_of
 from sound.project.project import Project
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
 from tests.patience import PATIENCE_SECONDS

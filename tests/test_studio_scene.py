@@ -12,11 +12,19 @@ import soundfile
 import trimesh
 
 from carillon.errors import UserError
-from sound.scenes.performance import GROUND, Impact, Performance, Voice
-from sound.scenes.picture import Appearance, Camera, Motion, Picture
+from sound.scenes.performance import (
+    GROUND,
+    Appearance,
+    Camera,
+    Impact,
+    Motion,
+    Performance,
+    Picture,
+    Voice,
+)
 from studio.binary import unpack
 from studio.scene import page, write_scene_page
-from studio.scene.content import GROUND_ON_PAGE, LOUDEST_STRIKE, QUIETEST_STRIKE, content, flac
+from studio.scene.page import GROUND_ON_PAGE, LOUDEST_STRIKE, QUIETEST_STRIKE, content, flac
 from studio.standalone.content import GAIN_ERROR, STEPS
 from tests.chromium import ARGUMENTS, CHECKOUT, PROGRAMS, served
 from tests.strike_latency import TAP_ADDRESS

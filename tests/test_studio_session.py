@@ -118,7 +118,7 @@ def aimed(page: Page, names: list[str]) -> bool:
 
 def settled(studio, page: Page) -> bool:
     """Whether no search is wanted any more, and the page has what the design sounds like."""
-    told = studio.reconciler.is_settled and page.feed.is_empty
+    told = studio.reconciler.is_settled and not page.feed._waiting
     return told and page.is_idle and not studio.session.is_searching
 
 

@@ -12,7 +12,7 @@ from sound.clips.wav import read_wav
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
-from sound.synthesis.bank import Bank, ring
+from sound.synthesis.sinusoids import Bank, ring
 from tests.chromium import chromium, served
 from tests.patience import PATIENCE_SECONDS
 from tests.small_design import small_design

@@ -12,12 +12,11 @@ from carillon.errors import UserError
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
-from sound.synthesis.bank import Bank, ring
+from sound.synthesis.sinusoids import Bank, ring
 from studio.binary import unpack
 from studio.standalone import write_page
 from studio.standalone.content import GAIN_ERROR, STEPS, content
-from studio.standalone.modules import PAGE, gathered, joined, shortened
-from studio.standalone.page import HERE, MANY_TRIANGLES
+from studio.standalone.page import HERE, MANY_TRIANGLES, PAGE, gathered, joined, shortened
 from tests.small_design import N_MODES, small_design
 from tests.studio_pages import axe_finds, until_page
 

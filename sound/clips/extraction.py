@@ -11,6 +11,7 @@ that the noise makes inevitable.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -21,17 +22,17 @@ from carillon.errors import UserError
 from carillon.processes.threads import blas_threads
 from sound.bounds import require_level
 from sound.clips.candidates import LEAST_DECAY
-from sound.clips.clipping import is_clipped, restored
-from sound.clips.ending import ending
-from sound.clips.free_vibration import SHORTEST_SAMPLES, free_modes
+from sound.clips.extent import ending, second_strike, strike_sample
+from sound.clips.free_vibration import SHORTEST_SAMPLES, free_modes, is_clipped, restored
 from sound.clips.glide import glide
 from sound.clips.mode_search import FEWEST_PERIODS, has_periods, is_mode
-from sound.clips.onset import second_strike, strike_sample
 from sound.clips.significance import Fit
 from sound.synthesis.sinusoids import damped_sinusoids, superposed
 
 LONGEST_SECONDS = 6.0
 """Length of the part after the strike that is searched for modes [s]."""
+MOSTLY_MODES = 0.8
+"""Least share of a clip's energy in its modes without a remark."""
 
 
 @dataclass(frozen=True)
@@ -184,14 +185,12 @@ def _steady(hertz: float, seconds: float) -> str:
 
 
 def _energies(fit: Fit, samples: int) -> Array:
-    """Energy of each sinusoid within the clip."""
     rate = -2.0 * fit.exponents.real
     share = -np.expm1(-rate * samples) / np.where(rate == 0.0, 1.0, rate)
     return np.abs(fit.coefficients) ** 2 * np.where(rate == 0.0, samples, share) / 2.0
 
 
 def _require_modes(fit: Fit, samples: int, rate: int) -> None:
-    """Refuse a clip whose energy is mostly not in modes."""
     energies = _energies(fit, samples)
     modes, whole = is_mode(fit, samples), has_periods(fit, samples)
     seconds = samples / rate
@@ -239,3 +238,25 @@ def _as_sound(fit: Fit, clip: Array, rate: int, scale: float, modes: int | None)
         rate=rate,
         evidence=evidence,
     )
+
+
+def remarks(evidence: Mapping[str, Any]) -> list[str]:
+    """Remarks, without full stops, on what is unusual in the evidence of a `ModalSound`."""
+    sentences = []
+    if evidence["explained"] < MOSTLY_MODES:
+        sentences.append(
+            "the rest is noise, or tones that do not fade evenly, and no material has it"
+        )
+    if evidence["clipped_samples"]:
+        sentences.append(f"{evidence['clipped_samples']} samples at full scale are left out")
+    if evidence["second_strike_seconds"] is not None:
+        sentences.append(
+            f"there is another strike at {evidence['second_strike_seconds']:.2f} s, left out"
+        )
+    if evidence["glide"] is not None:
+        bend = evidence["glide"]
+        sentences.append(
+            f"its loudest tone glides from {bend['cents']:+.0f} cents to {bend['hertz']:.1f} Hz "
+            f"within {bend['seconds']:.2f} s, which no material does"
+        )
+    return sentences

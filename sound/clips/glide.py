@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array, Complex
-from sound.clips.bands import low_pass
-from sound.clips.candidates import LOWEST_HERTZ
+from sound.clips.candidates import LOWEST_HERTZ, low_pass
 
 _HALF_WIDTH = 0.15
 """Half-width of the analysed band, over its tone's frequency."""
@@ -89,7 +88,7 @@ def _band(clip: Array, rate: int, centre: float) -> tuple[Complex, float, float]
 
 def _left_by_two(band: Complex) -> float:
     """Energy that one or two damped sinusoids leave unexplained, the lesser of the two."""
-    from sound.clips.esprit import exponents_of_orders
+    from sound.clips.candidates import exponents_of_orders
 
     time = np.arange(len(band))
 

@@ -42,27 +42,16 @@ _IMPERFECTION = 0.005
 
 @dataclass(frozen=True)
 class Instrument:
-    """An instrument.
+    """An instrument: its lowest partial has the frequency `pitch` [Hz] by default.
 
-    Attributes
-    ----------
-    pitch : float [Hz]
-        Frequency of the lowest partial by default.
-    partials
-        Function of (pitch, highest frequency, random numbers) that gives frequencies (n,) [Hz] and
-        relative amplitudes (n,).
-    damping : float [1/s]
-        Damping at frequency 0.
-    loss : float
-        Loss factor of the material; pi f `loss` is added to the damping at frequency f.
-    knock : float
-        Peak of the noise of the blow, relative to the sum of the partials' amplitudes.
-    knock_damping : float [1/s]
-        Damping of that noise.
+    `partials` gives frequencies (n,) [Hz] and relative amplitudes (n,) from the pitch and random
+    numbers.  The damping at frequency f is `damping` [1/s] plus pi f `loss`,
+    the material's loss factor.  The noise of the blow has the peak `knock`, relative to the sum of
+    the partials' amplitudes, and is damped by `knock_damping` [1/s].
     """
 
     pitch: float
-    partials: Callable[[float, float, np.random.Generator], tuple[Array, Array]]
+    partials: Callable[[float, np.random.Generator], tuple[Array, Array]]
     damping: float
     loss: float
     knock: float
@@ -72,10 +61,7 @@ class Instrument:
 def note_hertz(note: str) -> float:
     """Frequency of a note such as C4 or F#3, in equal temperament from A4 = 440 Hz.
 
-    Raises
-    ------
-    UserError
-        If it is no note.
+    Raises UserError if it is no note.
 
     Examples
     --------
@@ -94,25 +80,11 @@ def note_hertz(note: str) -> float:
 def synthesised(
     instrument: str, pitch: float | None, seconds: float, rate: int, seed: int
 ) -> ModalSound:
-    """The sound of a strike; the residual is the noise of the blow.
+    """The sound of a strike of one of `INSTRUMENTS`; the residual is the noise of the blow.
 
-    Parameters
-    ----------
-    instrument : str
-        One of `INSTRUMENTS`.
-    pitch : float or None [Hz]
-        Frequency of the lowest partial; the instrument's own if None.
-    seconds : float [s]
-        Duration.
-    rate : int [Hz]
-        Samples per second.
-    seed : int
-        Seed of the imperfections, the place of the strike, and the noise.
-
-    Raises
-    ------
-    UserError
-        If the pitch is too high for the sampling rate.
+    Its lowest partial has the frequency `pitch` [Hz], the instrument's own if None, and its rate is
+    in Hz.  Imperfections, the place of the strike and the noise are random, by the seed.  Raises
+    UserError if the pitch is too high for the sampling rate.
     """
     kind = INSTRUMENTS[instrument]
     pitch = kind.pitch if pitch is None else pitch
@@ -123,7 +95,9 @@ def synthesised(
             f"{highest:g} Hz"
         )
     random = np.random.default_rng(seed)
-    frequencies, amplitudes = kind.partials(pitch, highest, random)
+    frequencies, amplitudes = kind.partials(pitch, random)
+    audible = frequencies < highest
+    frequencies, amplitudes = frequencies[audible], amplitudes[audible]
     order = np.argsort(frequencies)
     order = order[(amplitudes >= LEAST_AMPLITUDE * amplitudes.max())[order]]
     frequencies, amplitudes = frequencies[order], amplitudes[order] / amplitudes[order].sum()
@@ -140,33 +114,30 @@ def synthesised(
     )
 
 
-def _plate(pitch: float, highest: float, random: np.random.Generator) -> tuple[Array, Array]:
+def _plate(pitch: float, random: np.random.Generator) -> tuple[Array, Array]:
     m, n = (part.ravel() for part in np.meshgrid(np.arange(1, 8), np.arange(1, 8)))
     frequencies = pitch * (m**2 + (_PLATE_ASPECT * n) ** 2) / (1.0 + _PLATE_ASPECT**2)
     frequencies *= random.normal(1.0, _IMPERFECTION, len(m))
     x, y = random.uniform(0.2, 0.45, 2)
     amplitudes = np.abs(np.sin(np.pi * m * x) * np.sin(np.pi * n * y)) / frequencies**0.5
-    kept = frequencies < min(highest, 30.0 * pitch)
+    kept = frequencies < 30.0 * pitch
     return frequencies[kept], amplitudes[kept]
 
 
-def _bar(pitch: float, highest: float, random: np.random.Generator) -> tuple[Array, Array]:
+def _bar(pitch: float, random: np.random.Generator) -> tuple[Array, Array]:
     n = np.arange(1, 7)
     frequencies = pitch * (np.where(n == 1, _BAR_FIRST, 2.0 * n + 1.0) / _BAR_FIRST) ** 2
     frequencies *= random.normal(1.0, _IMPERFECTION, len(n))
-    amplitudes = random.uniform(0.5, 1.0, len(n)) / n
-    kept = frequencies < highest
-    return frequencies[kept], amplitudes[kept]
+    return frequencies, random.uniform(0.5, 1.0, len(n)) / n
 
 
-def _string(pitch: float, highest: float, random: np.random.Generator) -> tuple[Array, Array]:
+def _string(pitch: float, random: np.random.Generator) -> tuple[Array, Array]:
     n = np.arange(1, 41)
     stiff = np.sqrt((1.0 + _STRING_STIFFNESS * n**2) / (1.0 + _STRING_STIFFNESS))
     frequencies = pitch * n * stiff
     amplitudes = np.abs(np.sin(np.pi * n * _HAMMER_POSITION)) / n
     amplitudes *= np.exp(-frequencies / _HAMMER_HERTZ) * random.uniform(0.8, 1.2, len(n))
-    kept = frequencies < highest
-    return frequencies[kept], amplitudes[kept]
+    return frequencies, amplitudes
 
 
 INSTRUMENTS = {

@@ -70,14 +70,8 @@ def _power_sums(exponents: Complex, count: int) -> tuple[Complex, Complex, Compl
 def solved(matrix: Array, right: Complex, damping: float = 1e-13) -> Complex:
     """Complex unknowns w of real normal equations with Levenberg-Marquardt damping.
 
-    Parameters
-    ----------
-    matrix : (2 n, 2 n)
-        See `normal_matrix`.
-    right : (n,) complex
-        A^T r of a signal r.
-    damping : float
-        Share of the diagonal that is added to the matrix.
+    The matrix (2 n, 2 n) is a `normal_matrix`, to which a share `damping` of its diagonal is added;
+    the right-hand side (n,) is A^T r of a signal r.
     """
     values = inverse(matrix, damping) @ np.concatenate([right.real, -right.imag])
     half = len(right)

@@ -3,9 +3,9 @@
 The clip is split into bands.  ESPRIT (Roy and Kailath 1989) finds the damped sinusoids of every
 band, ESTER (Badeau, David and Richard 2006) their number, and a least-squares fit to the whole clip
 refines them.  Narrow bands come first: they separate slow and close modes.  Wide bands then find
-quickly decaying modes in the rest.  Sinusoids that still stand out of the rest are added, see
-`sound.clips.pursuit`; those that do not stand out of the noise are dropped, so that ESTER may find
-too many.
+quickly decaying modes in the rest.  Sinusoids that still stand out of the rest, as peaks of its
+spectra under decaying windows, are added; those that do not stand out of the noise are dropped, so
+that ESTER may find too many.
 """
 
 from __future__ import annotations
@@ -14,9 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Complex
-from sound.clips.candidates import BAND_DECAY, BAND_SAMPLES, LEAST_DECAY, candidates, rings
-from sound.clips.pursuit import further
-from sound.clips.significance import Fit, settled
+from sound.clips.candidates import (
+    BAND_DECAY,
+    BAND_SAMPLES,
+    HIGHEST_FRACTION,
+    LEAST_DECAY,
+    LEAST_QUALITY,
+    LOWEST_HERTZ,
+    candidates,
+    rings,
+)
+from sound.clips.significance import NEIGHBOURHOOD, Fit, power_under, settled, threshold
 from sound.synthesis.sinusoids import superposed
 
 FEWEST_PERIODS = 3.0
@@ -32,6 +40,10 @@ SAME = 0.25
 UNDER_PEAK, DROWNED = 2.0, 0.01
 """Distance from a louder sinusoid, over that one's decay, and share of its amplitude, below which a
 sinusoid only corrects the fit of the louder one and is dropped."""
+APART = 4.0
+"""Least distance of two new sinusoids, over the decay of the quicker one."""
+MOST = 40
+"""Greatest number of sinusoids that are added at a time."""
 
 
 def sinusoids(clip: Array, rate: int, visible: bool = False) -> Fit:
@@ -68,7 +80,6 @@ def pursued(fit: Fit, clip: Array, rate: int) -> Fit:
 
 
 def _is_beside(exponents: Complex, others: Complex) -> NDArray[np.bool_]:
-    """Which exponents coincide with one of the others."""
     if not len(others):
         return np.zeros(len(exponents), bool)
     distance = np.abs(exponents[:, None] - others).min(axis=1)
@@ -102,3 +113,48 @@ def modes_of(fit: Fit, clip: Array) -> Fit:
 def has_periods(fit: Fit, samples: int) -> NDArray[np.bool_]:
     """Which sinusoids have enough periods within the clip."""
     return fit.exponents.imag * samples > 2.0 * np.pi * FEWEST_PERIODS
+
+
+def further(rest: Array, rate: int) -> Complex:
+    """Exponents (k,) per sample of damped sinusoids that stand out of a rest, strongest first.
+
+    Under a window exp(-d n), a sinusoid of the decay d has the greatest power over that of the
+    noise, which is the median around it.
+    """
+    decay, outstanding, scores = 1.0 / len(rest), [], []
+    while decay < np.pi / (4.0 * LEAST_QUALITY):
+        power, size = power_under(rest, decay, padding=2.0)
+        reach = max(16, round(NEIGHBOURHOOD * decay / (2.0 * np.pi) * size))
+        level = _medians(power, reach) / np.log(2.0)
+        score = 2.0 * power / np.maximum(level, np.finfo(float).tiny)
+        peaks = 1 + np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:]))
+        omega = 2.0 * np.pi * peaks / size
+        rings = omega > 2.0 * LEAST_QUALITY * decay
+        inside = (omega > 2.0 * np.pi * LOWEST_HERTZ / rate) & (omega < HIGHEST_FRACTION * np.pi)
+        exponents = -decay + 1j * omega
+        stands_out = score[peaks] > threshold(exponents, len(rest))
+        kept = rings & inside & stands_out
+        outstanding.append(exponents[kept])
+        scores.append(score[peaks][kept])
+        decay *= 2.0
+    return _apart(np.concatenate(outstanding), np.concatenate(scores))
+
+
+def _medians(power: Array, reach: int) -> Array:
+    """Median of the power around each frequency, interpolated between medians of intervals."""
+    count = max(1, len(power) // reach)
+    length = len(power) // count
+    middles = length * (np.arange(count) + 0.5)
+    medians = np.median(power[: count * length].reshape(count, length), axis=1)
+    return np.interp(np.arange(len(power)), middles, medians)
+
+
+def _apart(exponents: Complex, scores: Array) -> Complex:
+    chosen: list[complex] = []
+    for number in np.argsort(-scores):
+        each = exponents[number]
+        if all(abs(each - other) > APART * -min(each.real, other.real) for other in chosen):
+            chosen.append(complex(each))
+        if len(chosen) == MOST:
+            break
+    return np.array(chosen, complex)

@@ -30,14 +30,9 @@ _LEAST_LEVEL = 1e-15
 class Fit:
     """Damped sinusoids (k,) fitted to a clip of peak 1, see `sound.synthesis.sinusoids`.
 
-    Attributes
-    ----------
-    exponents, coefficients : (k,) complex
-        Exponents and coefficients in the order of frequency.
-    prominence : (k,)
-        Energy that the fit would lose without each sinusoid, over the level.
-    level : (k,)
-        Variance of white noise as strong as the noise at each sinusoid.
+    `exponents` and `coefficients` are in the order of frequency.  `prominence` is the energy that
+    the fit would lose without each sinusoid, over `level`, the variance of white noise as strong as
+    the noise at it.
     """
 
     exponents: Complex

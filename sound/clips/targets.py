@@ -29,22 +29,11 @@ FEWEST_MODES, MOST_MODES = 2, 30
 
 @dataclass(frozen=True)
 class Targets:
-    """Modes that a design should have at T struck points.
+    """Modes that a design should have at T struck points of some names.
 
-    Attributes
-    ----------
-    names : T texts
-        Names of the points.
-    frequencies : (N,) [Hz]
-        Frequencies, ascending, shared by all points.
-    dampings : (N,) [1/s]
-        Dampings, shared by all points.
-    amplitudes : (T, N)
-        Amplitudes at the strike; 0 where the clip of a point lacks a mode.
-    residuals : T arrays (s,)
-        Samples of each clip without its modes.
-    rates : T integers [Hz]
-        Sampling rates of the residuals.
+    Ascending frequencies (N,) [Hz] and dampings (N,) [1/s] are shared by all points; amplitudes (T,
+    N) are those at the strike, 0 where the clip of a point lacks a mode.  `residuals` are T arrays
+    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.
     """
 
     names: tuple[str, ...]
@@ -67,14 +56,10 @@ def share_frequencies(
     one for each clip if there are more clips.
 
     Modes of different clips that sound the same become one, whose frequency and damping are means
-    weighted by amplitude.  Modes are chosen one by one, each time the strongest of the clip whose
-    energy is covered least.  Shares of energy count, so loud and quiet clips count alike.
-
-    Raises
-    ------
-    UserError
-        If fewer modes were extracted from all clips together, or `auto` finds fewer than
-        `FEWEST_MODES`.
+    weighted by amplitude. Modes are chosen one by one, each time the strongest of the clip whose
+    energy is covered least. Shares of energy count, so loud and quiet clips count alike.  Raises
+    UserError if fewer modes were extracted from all clips together, or `auto` finds fewer than
+    `FEWEST_MODES`.
     """
     owners = np.repeat(np.arange(len(sounds)), [len(sound.frequencies) for sound in sounds])
     frequencies = np.concatenate([sound.frequencies for sound in sounds])
@@ -121,12 +106,7 @@ def share_frequencies(
 def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:
     """A clip without the modes nearest to some frequencies [Hz], if they sound the same.
 
-    The residual, which contains no modes anyway, stays as it is.
-
-    Raises
-    ------
-    UserError
-        If none is left.
+    The residual, which contains no modes anyway, stays as it is.  Raises UserError if none is left.
 
     Examples
     --------

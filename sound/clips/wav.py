@@ -1,8 +1,9 @@
-"""Sound files: clips are read, sounds are written."""
+"""Sound files: clips are read, unless they were cut short, and sounds are written."""
 
 from __future__ import annotations
 
 import io
+import os
 from pathlib import Path
 
 import numpy as np
@@ -18,28 +19,30 @@ from sound.bounds import (
     MOST_CLIP_SAMPLES,
     require_level,
 )
-from sound.clips.clipping import CLIPPED_RUN, is_clipped
-from sound.clips.riff import missing_bytes
+from sound.clips.free_vibration import CLIPPED_RUN, is_clipped
 from sound.outputs import require_output
 
 ENDINGS = (".wav",)
 """Endings of the names of sound files that are written."""
 PEAK = 0.89
 """Peak magnitude of a normalised sound: 1 dB below full scale."""
+UNKNOWN = 0x7FFF_F000
+"""Least length of a chunk that stands for an unknown one: programs that write to a pipe cannot fill
+in the length later."""
+MOST_CHUNKS = 1000
+"""Greatest number of chunks that are read; a recording has a few."""
+_HEAD = 12
+"""Length of the file's head [bytes]."""
 
 
 def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]:
     """Samples (s,) of a sound file, full scale being 1, and their rate [Hz].
 
     Of several channels, the loudest of those clipped least is read: microphones at several places
-    receive each mode at another phase, and some modes cancel in the mean.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, cut off or not a sound file, is empty, silent, clipped (unless that
-        is allowed) or longer than `MOST_CLIP_SAMPLES`, or has samples that are not finite numbers;
-        or if its rate, its number of channels or its level is beyond `sound.bounds`.
+    receive each mode at another phase, and some modes cancel in the mean.  Raises UserError if the
+    file is missing, cut off or not a sound file, is empty, silent, clipped (unless that is allowed)
+    or longer than `MOST_CLIP_SAMPLES`, or has samples that are not finite numbers; or if its rate,
+    its number of channels or its level is beyond `sound.bounds`.
     """
     path = require_file(path, "a sound clip (WAV)")
     try:
@@ -50,22 +53,11 @@ def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]
 
 
 def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -> None:
-    """Write one channel (s,) or several (s, c) as WAV of 32-bit floats, atomically.
+    """Write one channel (s,) or several (s, c) as WAV of 32-bit floats, atomically; full scale is
+    1.
 
-    Parameters
-    ----------
-    samples : (s,) or (s, c)
-        Full scale is 1.
-    rate : int [Hz]
-        Samples per second.
-    peak : bool
-        Whether the largest magnitude becomes `PEAK`.
-
-    Raises
-    ------
-    UserError
-        If the name does not end in .wav, samples are not finite or beyond what the format holds,
-        or the file cannot be written.
+    With `peak`, the largest magnitude becomes `PEAK`.  Raises UserError if the name does not end in
+    .wav, samples are not finite or beyond what the format holds, or the file cannot be written.
     """
     require_output(path, ENDINGS)
     samples = np.asarray(samples, dtype=float)
@@ -99,10 +91,7 @@ def as_wav(samples: Array, rate: int) -> bytes:
 def _channels(path: Path) -> tuple[Array, int]:
     """Samples (s, c) and their rate [Hz]; bounds are checked before samples are read.
 
-    Raises
-    ------
-    UserError
-        That does not name the file.
+    Raises UserError that does not name the file.
     """
     import soundfile  # Slow to load.
 
@@ -146,10 +135,7 @@ def _require_bounds(rate: int, channels: int, frames: int) -> None:
 def _heard(channels: Array, allow_clipped: bool) -> Array:
     """The channel (s,) of channels (s, c) that is searched.
 
-    Raises
-    ------
-    UserError
-        That does not name the file.
+    Raises UserError that does not name the file.
     """
     if not len(channels):
         raise UserError("has no samples, expected the sound of a strike")
@@ -169,3 +155,27 @@ def _heard(channels: Array, allow_clipped: bool) -> Array:
             "in a project allow_clipped: true"
         )
     return np.ascontiguousarray(channels[:, best])
+
+
+def missing_bytes(path: str | Path) -> int:
+    """Number of bytes of samples that a WAV file announces but lacks; 0 for any other file.
+
+    Libraries read what there is, so half a recording would pass for a whole one.  Raises OSError if
+    the file cannot be read.
+    """
+    size = os.path.getsize(path)
+    with open(path, "rb") as file:
+        head = file.read(_HEAD)
+        if head[:4] != b"RIFF" or head[8:] != b"WAVE":
+            return 0
+        place = _HEAD
+        for _ in range(MOST_CHUNKS):
+            file.seek(place)
+            name, length = file.read(4), int.from_bytes(file.read(4), "little")
+            place += 8
+            if place > size:
+                break
+            if name == b"data":
+                return max(0, place + length - size) if length < UNKNOWN else 0
+            place += length + length % 2
+    return 0

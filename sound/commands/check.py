@@ -47,8 +47,7 @@ def comparison(design: Design, fine: FineFrequencies) -> dict[str, Any]:
 
     Coarse frequencies are those of the coarse modes that have the shapes of the fine ones.
     """
-    from sound.design.bark import bark
-    from sound.design.cents import cents, rms_cents
+    from sound.design.pitch import bark, cents, rms_cents
 
     targets = design.targets.frequencies
     coarse = design.coarse_frequencies[fine.order]
@@ -67,7 +66,6 @@ def comparison(design: Design, fine: FineFrequencies) -> dict[str, Any]:
 
 
 def _lines(content: dict[str, Any]) -> list[str]:
-    """A line for each mode, and one for all."""
     names = ("target_hz", "coarse_hz", "fine_hz", "coarse_cents", "fine_cents", "fine_bark")
     heads = ("target Hz", "coarse Hz", "fine Hz", "coarse cents", "fine cents", "fine bark")
     lines = ["  ".join(["mode", *(f"{head:>12}" for head in heads)])]

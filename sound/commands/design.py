@@ -18,7 +18,7 @@ from carillon.errors import UserError
 from carillon.files.locks import locked
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
-from sound.commands.search_options import SearchOptions
+from sound.commands.common_options import SearchOptions
 from sound.design.interrupts import ended_by_interrupts
 from sound.design.objective import fall
 
@@ -31,6 +31,8 @@ ENDINGS = (".h5", ".hdf5")
 """Endings of the names of designs."""
 SLOW = ("trimesh", "sound.design.optimise")
 """Modules that take seconds to load and that `--help` does not need."""
+_COSTS = ("cost_start", "cost", "frequency_cost", "amplitude_cost")
+_EFFORT = ("seconds", "evaluations", "evaluations_per_minute", "workers", "method")
 SHOWN_EVERY = 1.0
 """Time between two progress lines on a terminal [s]."""
 
@@ -75,7 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _search(options: DesignOptions, settings: SearchOptions) -> int:
-    """Search, writing the design every half minute and at the end."""
     from sound.commands.watching import EditedProject, design_on
     from sound.design.optimise import optimise
     from sound.design.preparation import prepare, require_same_voxels
@@ -158,7 +159,7 @@ class _SearchProgress:
 
 def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
-    from sound.design.cents import rms_cents
+    from sound.design.pitch import rms_cents
 
     evidence = design.evidence
     targets = design.targets.frequencies
@@ -166,16 +167,9 @@ def summarise(design: Design) -> dict[str, Any]:
     assert design.damping is not None
     ratios = design.damping.dampings / design.targets.dampings
     return {
-        "cost_start": evidence["cost_start"],
-        "cost": evidence["cost"],
-        "frequency_cost": evidence["frequency_cost"],
-        "amplitude_cost": evidence["amplitude_cost"],
+        **{key: evidence[key] for key in _COSTS},
         "fall": fall(evidence["cost_start"], evidence["cost"]),
-        "seconds": evidence["seconds"],
-        "evaluations": evidence["evaluations"],
-        "evaluations_per_minute": evidence["evaluations_per_minute"],
-        "workers": evidence["workers"],
-        "method": evidence["method"],
+        **{key: evidence[key] for key in _EFFORT},
         "modes": len(design.frequencies),
         "targets": [strike.name for strike in design.strikes],
         "target_distances_m": [strike.distance for strike in design.strikes],
@@ -213,7 +207,6 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
 
 
 def _rms_sentence(summary: dict[str, Any]) -> str:
-    """Distance of the frequencies from the targets up to the best common factor."""
     coarse, fine = summary["coarse_rms_cents"], summary["fine_rms_cents"]
     if fine is None:
         return f"from their targets (rms): {coarse:.1f} cents"
@@ -224,7 +217,6 @@ def _rms_sentence(summary: dict[str, Any]) -> str:
 
 
 def _material_sentence(design: Design) -> str:
-    """Moduli and density, and the share of moduli beyond their bounds."""
     low, high = design.young.min(), design.young.max()
     text = (
         f"Young's modulus {low / 1e9:.3g} to {high / 1e9:.3g} GPa, density "
@@ -236,7 +228,6 @@ def _material_sentence(design: Design) -> str:
 
 
 def _damping_sentence(summary: dict[str, Any]) -> str:
-    """Dampings by loss factors over those of the clips."""
     low, median, high = np.quantile(summary["damping_ratios"], (0.25, 0.5, 0.75))
     factors = summary["loss_factors"]
     return (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from carillon.parameters.quantities import between
-from sound.commands.damping_options import DampingOptions
+from sound.commands.common_options import DampingOptions
 from sound.export.formats import FORMATS, format_of
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.

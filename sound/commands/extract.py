@@ -73,7 +73,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _content(clips: Sequence[str], sounds: list[ModalSound], targets: Targets) -> dict[str, Any]:
-    """What is printed and written."""
     return {
         "clips": [
             {"file": clip, "rate_hz": sound.rate, **sound.evidence}
@@ -87,8 +86,7 @@ def _content(clips: Sequence[str], sounds: list[ModalSound], targets: Targets) -
 
 
 def _line(clip: dict[str, Any]) -> str:
-    """What was found in one clip, and whether that is the most of it."""
-    from sound.clips.remarks import remarks
+    from sound.clips.extraction import remarks
 
     line = (
         f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
@@ -98,7 +96,6 @@ def _line(clip: dict[str, Any]) -> str:
 
 
 def _lines(content: dict[str, Any]) -> list[str]:
-    """A line per clip, then a line per mode with its level in each clip."""
     from math import log10
 
     lines = [_line(clip) for clip in content["clips"]]

@@ -68,7 +68,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _file_of(path: str) -> str:
-    """The file to write, which is not there yet."""
     file = os.path.join(path, DEFAULT_NAME) if os.path.isdir(path) else path
     if os.path.lexists(file):
         raise UserError(f"{file}: is there already; name another file, or remove it first")
@@ -76,7 +75,6 @@ def _file_of(path: str) -> str:
 
 
 def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
-    """Keys and values that are not left to their defaults."""
     from carillon.builtin_names import BUILTIN_PREFIX
 
     builtin = options.mesh.startswith(BUILTIN_PREFIX)
@@ -92,12 +90,11 @@ def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
 
 
 def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
-    """A target for each clip, far from each other on the surface."""
     import numpy as np
 
     from solver.response.vertices import spread
     from sound.clips.files import clip_names
-    from sound.surface import longest_side, struck_surface
+    from sound.strikes import longest_side, struck_surface
 
     surface = struck_surface(mesh)
     vertices = np.asarray(surface.vertices)[np.unique(surface.faces)]
@@ -115,13 +112,6 @@ def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _require_modes(clips: Sequence[str], allow_clipped: bool) -> None:
-    """Refuse clips of which no design can be made as a project asks for by itself.
-
-    Raises
-    ------
-    UserError
-        If a clip is unusable, or all have too few modes for a design.
-    """
     from sound.clips.files import clip_names, extract_file
     from sound.clips.targets import share_frequencies
 

@@ -87,7 +87,6 @@ def _require_same_targets(options: ReachOptions, names: list[str], design: Desig
 
 
 def _lines(result: Reach) -> list[str]:
-    """A line for each mode, and one for all."""
     heads = ("target Hz", "cents", "alone", "beside")
     lines = ["  ".join(["mode", *(f"{head:>10}" for head in heads), "verdict"])]
     for each in result.modes:

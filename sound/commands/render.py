@@ -19,16 +19,11 @@ from sound.bounds import (
     SampleRate,
     require_length,
 )
-from sound.commands.damping_options import DampingOptions
+from sound.commands.common_options import DampingOptions
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
-    import numpy as np
-    from numpy.typing import NDArray
-
     from sound.rendering.heard_solid import HeardSolid
     from sound.rendering.render import Hit
-
-    Array = NDArray[np.float64]
 
 LONGEST_CONTACT = 1.0
 """Greatest duration of a strike's force [s]."""
@@ -119,7 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from sound.clips.wav import PEAK, write_wav
     from sound.rendering.heard_solid import open_heard_solid
-    from sound.rendering.render import rendered_parts, ringing_seconds
+    from sound.rendering.render import rendered_parts, residual_share, ringing_seconds
 
     options, points = collect(RenderOptions, arguments), collect(PointOptions, arguments)
     _require_outputs(options, points)
@@ -145,7 +140,11 @@ def run(arguments: argparse.Namespace) -> int:
     write_wav(options.out, scale * sound, options.rate)
     if options.modes_out is not None:
         write_wav(options.modes_out, scale * modes, options.rate)
-    summary = _summary(options, heard, hits, scale) | _level(scale * modes, scale * noise)
+    modes, noise = scale * modes, scale * noise
+    summary = _summary(options, heard, hits, scale) | {
+        "peak": float(np.abs(modes + noise).max(initial=0.0)),
+        "residual_share": residual_share(modes, noise),
+    }
     print(json.dumps(summary) if options.json else _sentence(summary))
     if scale * peak > 1.0:
         advice = "lower --strength for players, or --normalise"
@@ -154,7 +153,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _require_outputs(options: RenderOptions, points: PointOptions) -> None:
-    """Refuse unusable output names and lengths, before the work."""
     from sound.clips.wav import ENDINGS
     from sound.outputs import require_output
 
@@ -171,7 +169,6 @@ def _require_outputs(options: RenderOptions, points: PointOptions) -> None:
 
 
 def _hits(heard: HeardSolid, points: PointOptions, strike: ImpulseOptions) -> list[Hit]:
-    """The strikes that are asked for."""
     import numpy as np
 
     from sound.rendering.render import Hit
@@ -200,10 +197,9 @@ def _hits(heard: HeardSolid, points: PointOptions, strike: ImpulseOptions) -> li
 def _summary(
     options: RenderOptions, heard: HeardSolid, hits: list[Hit], scale: float
 ) -> dict[str, Any]:
-    """What sounds; of a single strike also where, how, and how loud each mode."""
     solid, listening = heard.solid, heard.listening
     audible = solid.frequencies < options.rate / 2.0
-    summary = {
+    summary: dict[str, Any] = {
         "out": str(Path(options.out)),
         "modes_out": None if options.modes_out is None else str(Path(options.modes_out)),
         "rate_hz": options.rate,
@@ -212,8 +208,11 @@ def _summary(
         "frequencies_hz": solid.frequencies[audible].tolist(),
         "dampings_per_second": solid.dampings[audible].tolist(),
         "modes_left_out": int((~audible).sum()),
-        "missed_share": None if listening is None else _missed(heard, hits),
+        "missed_share": None,
     }
+    if listening is not None:
+        weights = sum(listening.weights(hit.position) for hit in hits) / len(hits)
+        summary["missed_share"] = float(weights @ listening.missed)
     if len(hits) > 1:
         return summary
     (hit,) = hits
@@ -226,22 +225,6 @@ def _summary(
         "gain": gain,
         "amplitudes": amplitudes[audible].tolist(),
     }
-
-
-def _missed(heard: HeardSolid, hits: list[Hit]) -> float:
-    """Share of the clips' energy in tones that no mode has, of those clips that are struck."""
-    assert heard.listening is not None
-    weights = sum(heard.listening.weights(hit.position) for hit in hits) / len(hits)
-    return float(weights @ heard.listening.missed)
-
-
-def _level(modes: Array, noise: Array) -> dict[str, float]:
-    from numpy import abs
-
-    from sound.rendering.render import residual_share
-
-    peak = float(abs(modes + noise).max(initial=0.0))
-    return {"peak": peak, "residual_share": residual_share(modes, noise)}
 
 
 def _sentence(summary: dict[str, Any]) -> str:

@@ -33,19 +33,9 @@ AS_BEFORE = "going on with the project as it was"
 
 
 class EditedProject:
-    """A project whose file is edited.
+    """A project whose file at `path` is edited; `project` is the last valid one.
 
-    Parameters
-    ----------
-    path
-        Project file.
-    load
-        Reads the file, and raises a `UserError` if it is invalid.
-
-    Attributes
-    ----------
-    project
-        Last valid project.
+    `load` reads the file, and raises a `UserError` if it is invalid.
     """
 
     def __init__(self, path: str | Path, load: Callable[[], Project]) -> None:
@@ -97,14 +87,10 @@ def design_on(
 ) -> Design:
     """Search until an interrupt, with the project as it is edited; `problem` is the first one.
 
-    Every better design is written to `out`, and its sounds beside it.  An edit of the solid starts
-    a new search; after any other edit the search goes on from the best material.  An edit that
-    cannot be designed is reported, and the search goes on with the project before.
-
-    Raises
-    ------
-    UserError
-        If the project to begin with cannot be designed, or the results cannot be written.
+    Every better design is written to `out`, and its sounds beside it. An edit of the solid starts a
+    new search; after any other edit the search goes on from the best material. An edit that cannot
+    be designed is reported, and the search goes on with the project before.  Raises UserError if
+    the project to begin with cannot be designed, or the results cannot be written.
     """
     writer = _Writer(out, edited.project)
     former: tuple[DesignProblem, Design | None, _Writer] | None = None
@@ -146,15 +132,12 @@ def design_on(
 
 
 def _edited(former: DesignProblem, project: Project) -> DesignProblem:
-    """The problem of an edited project; targets of the same clips are known."""
     before = former.project
     same = (project.targets, project.modes) == (before.targets, before.modes)
     return prepare(project, former.setting.objective.targets if same else None)
 
 
 class _Writer:
-    """Writes designs of a project, and the sound of every target beside them."""
-
     def __init__(self, out: Path, project: Project) -> None:
         self._out = out
         self._files = sound_files(out, [target.name for target in project.targets])

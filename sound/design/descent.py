@@ -21,14 +21,9 @@ from sound.design.simulation import Evaluation, Simulation
 class DescentLimits:
     """Limits of a descent, and the receiver of its steps.
 
-    Attributes
-    ----------
-    deadline : float [s]
-        Monotonic clock at which no further evaluation begins.
-    evaluations : float
-        Greatest number of evaluations; that of the start is always made.
-    tell
-        Called with every material that lowers the cost.
+    No evaluation begins after `deadline` [s], by the monotonic clock, nor after so many
+    `evaluations`; that of the start is always made.  `tell` is called with every material that
+    lowers the cost.
     """
 
     deadline: float = np.inf
@@ -48,18 +43,9 @@ class CostPoint(NamedTuple):
 class DesignDescent:
     """Record of a descent.
 
-    Attributes
-    ----------
-    last
-        Last material; None in another process than the descent's.
-    costs
-        Costs from the start on, the last one that of `last`.
-    evaluations
-        Number of evaluations.
-    damping
-        State of the steps, with which another descent may go on.
-    stalled
-        Whether no further step lowers the cost.
+    `last` is its last material, None in another process than the descent's; `costs` are those from
+    the start on to that one.  With the `damping`, the state of its steps, another descent may go
+    on.  It has `stalled` if no further step lowers the cost.
     """
 
     last: Evaluation | None
@@ -75,19 +61,9 @@ class DesignDescent:
 
 
 class Descent:
-    """A descent in progress.
+    """A descent in progress, within `limits`; its `record` is that so far.
 
-    Parameters
-    ----------
-    simulation, objective
-        Solid and objective, which together give the cost.
-    limits
-        Limits of the descent.
-
-    Attributes
-    ----------
-    record
-        Record of the descent so far.
+    The simulation and the objective together give the cost.
     """
 
     record: DesignDescent
@@ -110,10 +86,7 @@ class Descent:
         """Evaluate the first material (m,), see `Simulation.evaluate`; `damping` is that of the
         record.
 
-        Raises
-        ------
-        ConvergenceError
-            If it has no modes.
+        Raises ConvergenceError if it has no modes.
         """
         evaluation = self.simulation.evaluate(z, start, derivatives)
         costs = [CostPoint(time.monotonic(), 1, self.cost_of(evaluation))]

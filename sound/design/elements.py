@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 
@@ -26,10 +27,7 @@ STRAINS = 6
 class AnalysedElements(ABC):
     """Elements of a solid as functions of the moduli (M,) [Pa] of its voxels.
 
-    Attributes
-    ----------
-    model
-        Analysed solid with moduli of 1 Pa.
+    `model` is the analysed solid with moduli of 1 Pa.
     """
 
     model: Solid
@@ -38,26 +36,16 @@ class AnalysedElements(ABC):
         """The solid with these moduli."""
         return self.model.with_young(young)
 
-    def solve(
-        self,
-        solver: ModalSolver,
-        young: Array,
-        start: Modes | Array | None,
-        poisson: float | None = None,
-    ) -> Modes:
-        """Modes by a solver of `model`, see `ModalSolver.solve`."""
-        return solver.solve(young, start, poisson)
+    def solve(self, solver: ModalSolver, young: Array, *how: Any) -> Modes:
+        """Modes by a solver of `model`; `ModalSolver.solve` has the other parameters."""
+        return solver.solve(young, *how)
 
     @abstractmethod
     def slopes(self, young: Array, directions: Array) -> Array:
         """Derivatives (p c, m) of the moduli at the p points of c elements.
 
-        They are directional derivatives along m `directions` (M, m) of the voxels' moduli.
-
-        Raises
-        ------
-        UserError
-            If the coarsening has no derivatives.
+        They are directional derivatives along m `directions` (M, m) of the voxels' moduli.  Raises
+        UserError if the coarsening has no derivatives.
         """
 
     @abstractmethod
@@ -68,16 +56,8 @@ class AnalysedElements(ABC):
 def analysed_elements(
     mesh: HexMesh, options: ProblemOptions, cells: FiniteCells | None = None
 ) -> AnalysedElements:
-    """Elements of a solid: finite cells, voxels, or blocks of a coarsening.
-
-    Parameters
-    ----------
-    mesh
-        Voxels.
-    options
-        Constants, coarsening and forests.
-    cells
-        Finite cells with these voxels; None if there are none.
+    """Elements of a solid by its options: finite cells with its voxels, voxels, or blocks of a
+    coarsening.
     """
     constants: Constants = {"poisson": options.poisson, "density": options.density}
     if cells is not None:
@@ -122,14 +102,8 @@ class _CoarseElements(_FineElements):
     def with_young(self, young: Array) -> Solid:
         return self._model(self._moduli(young))
 
-    def solve(
-        self,
-        solver: ModalSolver,
-        young: Array,
-        start: Modes | Array | None,
-        poisson: float | None = None,
-    ) -> Modes:
-        return solver.solve_coarse(self._moduli(young), start, poisson)
+    def solve(self, solver: ModalSolver, young: Array, *how: Any) -> Modes:
+        return solver.solve_coarse(self._moduli(young), *how)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         blocks = self._blocks

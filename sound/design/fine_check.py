@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
@@ -25,8 +24,6 @@ from sound.design.simulation import Evaluation, Simulation
 from sound.design.tasks import Setting
 from sound.project.design import Design, FineFrequencies
 
-Index = NDArray[np.int64]
-
 CLEAR = 0.7
 """Least modal assurance criterion of two modes that count as one shape."""
 FINE_TOLERANCE = 1e-5
@@ -37,18 +34,10 @@ FINE_TOLERANCE = 1e-5
 class FineModes:
     """Elastic modes of the fine solid, matched with coarse ones.
 
-    Attributes
-    ----------
-    frequencies : (N,) [Hz]
-        Frequencies, ascending.
-    order : (N,)
-        Numbers of the coarse modes of the same shapes.
-    coarse : (N,) [Hz]
-        Frequencies of these coarse modes.
-    excess : (T, N)
-        Balances of amplitudes of these coarse modes minus those of the fine modes.
-    cost
-        Cost of the fine solid, Eq. (4).
+    `frequencies` (N,) [Hz] ascend; `order` (N,) are the numbers of the coarse modes of the same
+    shapes, and `coarse` (N,) [Hz] their frequencies.  `excess` (T, N) are the balances of
+    amplitudes of these coarse modes minus those of the fine modes, `cost` is that of the fine
+    solid, Eq. (4).
     """
 
     frequencies: Array
@@ -64,16 +53,11 @@ class FineModes:
 
 
 class FineSolid:
-    """The fine solid of a coarse one; modes of one material are the start of the next analysis.
+    """The fine solid of a search that coarsens; modes of one material are the start of the next
+    analysis.
 
-    It uses one thread, as the search does, so results do not depend on the machine's cores.
-
-    Parameters
-    ----------
-    setting
-        Setting of a search that coarsens.
-    coarse
-        Simulation of the coarse solid.
+    `coarse` simulates the coarse solid.  One thread is used, as by the search, so results do not
+    depend on the machine's cores.
     """
 
     def __init__(self, setting: Setting, coarse: Simulation) -> None:
@@ -86,10 +70,7 @@ class FineSolid:
     def modes(self, evaluation: Evaluation) -> FineModes:
         """Modes of the material of an evaluation of the coarse solid.
 
-        Raises
-        ------
-        ConvergenceError
-            If they were not found.
+        Raises ConvergenceError if they were not found.
         """
         simulation, setting = self._simulation, self._setting
         with one_thread():
@@ -110,10 +91,7 @@ class FineSolid:
 def fine_frequencies(design: Design) -> FineFrequencies:
     """Frequencies of a design on its fine solid; of one that was not coarsened, its own.
 
-    Raises
-    ------
-    ConvergenceError
-        If the modes were not found.
+    Raises ConvergenceError if the modes were not found.
     """
     count = len(design.targets.frequencies)
     if not is_coarsened(design):
@@ -140,13 +118,7 @@ def is_coarsened(design: Design) -> bool:
 
 
 class ShapeMatch:
-    """Matching of the modes of a coarse and a fine solid by their shapes.
-
-    Parameters
-    ----------
-    coarse, fine
-        The two solids, with any moduli.
-    """
+    """Matching of the modes of a coarse and a fine solid, with any moduli, by their shapes."""
 
     def __init__(self, coarse: Solid, fine: Solid) -> None:
         # Lumped mass up to a factor: the number of elements at each node.
@@ -154,15 +126,11 @@ class ShapeMatch:
         self._interpolation = interpolation(coarse, fine.mesh.nodes)
 
     def order(self, coarse_modes: Array, fine_modes: Array) -> Index:
-        """Numbers (N,) of the coarse modes that match the fine ones.
+        """Numbers (N,) of the coarse modes (3 n, N) that match the fine ones (3 n, N), both
+        ascending.
 
         Modes of clearly the same shape are pairs.  The others, whose shapes the coarse solid does
         not have, are paired in the order of frequency.
-
-        Parameters
-        ----------
-        coarse_modes, fine_modes : (3 n, N)
-            Modes on the nodes of the two solids, by ascending frequency.
         """
         count = fine_modes.shape[1]
         nodal = self._interpolation @ coarse_modes.reshape(-1, 3 * count)

@@ -8,10 +8,10 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import UserError
+from carillon.fem.element import elasticity_matrix
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
 from carillon.fem.moduli import require_moduli
-from sound.design.poisson import FreePoisson
 
 LAWS = ("linear", "exponential")
 """Laws from the field Phi z to moduli, see `ReducedMaterial`."""
@@ -23,34 +23,26 @@ only make cells without stiffness.
 """
 REACH = np.log(100.0)
 """Natural logarithm of the largest modulus of the exponential law over the reference modulus."""
+FIRST, SECOND = 0.0, 0.4
+"""Poisson's ratios of the two elasticity matrices whose combinations are all others."""
 
 
 @dataclass(frozen=True)
 class ReducedMaterial:
     """Moduli of the cells as a function of reduced coordinates z (section 6, [XLCB15]).
 
-    `linear` is Y / Y0 = g(x) with x = 1 + Phi z, where g(x) = x above the knee k and
-    k exp(x / k - 1) below it: the paper's Y = Phi z, continued smoothly to stay positive.
-    `exponential` is Y / Y0 = exp(r tanh(Phi z / r)) with r = `REACH`, about exp(Phi z), for moduli
-    that differ by decades.
+    `linear` is Y / Y0 = g(x) with x = 1 + Phi z, where g(x) = x above the knee k and k exp(x / k -
+    1) below it: the paper's Y = Phi z, continued smoothly to stay positive. `exponential` is Y / Y0
+    = exp(r tanh(Phi z / r)) with r = `REACH`, about exp(Phi z), for moduli that differ by decades.
 
     Neither frequencies relative to the first one nor balances of amplitudes depend on a factor
     common to all moduli, so the constant part is not among the coordinates: z = 0 is the uniform
-    material Y0.
+    material Y0, of the modulus `young` [Pa].
 
-    Attributes
-    ----------
-    basis : (M, m)
-        Modes of the Laplacian without the constant one, of root mean square 1.
-    laplacian : (m,)
-        Eigenvalues of these modes, the diagonal of Q in Eq. (4).
-    young : float [Pa]
-        Modulus Y0.
-    law : str
-        One of `LAWS`.
-    free_poisson
-        Poisson's ratio as a function of the last coordinate; None if it is fixed.  Moduli do not
-        depend on that coordinate: its column of the basis and its eigenvalue are 0.
+    Phi is `basis` (M, m), the modes of the Laplacian without the constant one, of root mean square
+    1, and `laplacian` (m,) their eigenvalues, the diagonal of Q in Eq. (4).  Poisson's ratio may be
+    free, a function of the last coordinate.  Moduli do not depend on that: its column of the basis
+    and its eigenvalue are 0.
     """
 
     basis: Array
@@ -70,10 +62,8 @@ class ReducedMaterial:
     ) -> ReducedMaterial:
         """Reduction of the moduli of a mesh to `dimensions` coordinates, beside Poisson's ratio.
 
-        Raises
-        ------
-        UserError
-            If the mesh has too few cells, the law is unknown or the modulus out of range.
+        Raises UserError if the mesh has too few cells, the law is unknown or the modulus out of
+        range.
         """
         if law not in LAWS:
             raise UserError(f"material law {law!r} is unknown, expected one of {', '.join(LAWS)}")
@@ -134,3 +124,54 @@ class ReducedMaterial:
     def regulariser(self, z: Array) -> float:
         """R = 1/2 z^T Q z of Eq. (4)."""
         return float(0.5 * z @ (self.laplacian * z))
+
+
+@dataclass(frozen=True)
+class FreePoisson:
+    """Poisson's ratio between bounds, as a function of a coordinate; `start` belongs to 0."""
+
+    low: float
+    high: float
+    start: float
+
+    def at(self, coordinate: float) -> float:
+        """Poisson's ratio: a logistic function, so that it stays within the bounds."""
+        share = 1.0 / (1.0 + np.exp(-coordinate) * (self.high - self.start) / self._above)
+        return float(self.low + (self.high - self.low) * share)
+
+    def slope(self, poisson: float) -> float:
+        """Derivative of Poisson's ratio by the coordinate."""
+        return (poisson - self.low) * (self.high - poisson) / (self.high - self.low)
+
+    def coordinate(self, poisson: float) -> float:
+        """Inverse of `at`; ratios out of the bounds are moved into them."""
+        margin = 1e-3 * (self.high - self.low)
+        inside = float(np.clip(poisson, self.low + margin, self.high - margin))
+        odds = (inside - self.low) / (self.high - inside)
+        return float(np.log(odds * (self.high - self.start) / self._above))
+
+    @property
+    def _above(self) -> float:
+        return self.start - self.low
+
+
+def elasticity_slope(poisson: float) -> tuple[float, float]:
+    """Weights of the elasticity at `FIRST` and `SECOND` in its derivative by Poisson's ratio.
+
+    Elasticity is linear in the two Lame parameters, so any two span it, exactly.
+
+    Examples
+    --------
+    >>> step, weights = 1e-6, elasticity_slope(0.3)
+    >>> by_weights = sum(w * elasticity_matrix(v) for w, v in zip(weights, (FIRST, SECOND)))
+    >>> difference = elasticity_matrix(0.3 + step) - elasticity_matrix(0.3 - step)
+    >>> bool(np.allclose(by_weights, difference / (2.0 * step)))
+    True
+    """
+    spread, denominator = 1.0 + poisson, (1.0 + poisson) * (1.0 - 2.0 * poisson)
+    slopes = [(1.0 + 2.0 * poisson**2) / denominator**2, -0.5 / spread**2]
+    matrices = elasticity_matrix(FIRST), elasticity_matrix(SECOND)
+    # The first Lame parameter is off the diagonal, the second one at its end.
+    lame = np.array([[matrix[0, 1], matrix[3, 3]] for matrix in matrices]).T
+    first, second = np.linalg.solve(lame, slopes)
+    return float(first), float(second)

@@ -38,18 +38,12 @@ def outside_response(
 
     Parameters
     ----------
-    modes
-        Modes of the analysis.
-    inverse
-        (K - mu M)^-1 with mu between the eigenvalues, close to none.
-    elastic : (3 n, N)
-        Computed elastic modes.
-    values : (N,) [rad^2/s^2]
-        Eigenvalues of the elastic modes.
+    modes, inverse
+        Modes of the analysis; (K - mu M)^-1 with mu between the eigenvalues, close to none.
+    elastic, values : (3 n, N), (N,) [rad^2/s^2]
+        Computed elastic modes, and their eigenvalues.
     pushes : (3 n, T)
         Forces f.
-    accuracy : float
-        Greatest relative change by the last block.
     """
     struck = pushes.shape[1]
     space = _Space(modes, elastic, MOST_BLOCKS * struck)
@@ -68,21 +62,10 @@ def outside_response(
 
 
 class _Space:
-    """Growing subspace, orthogonal to the rigid motions and the computed modes.
+    """Growing subspace of at most `room` vectors, orthogonal to the rigid motions and the computed
+    modes.
 
-    Parameters
-    ----------
-    modes
-        Modes of the analysis.
-    elastic
-        Elastic modes.
-    room
-        Greatest number of vectors.
-
-    Attributes
-    ----------
-    stiffness
-        V^T K V (m, m) with the orthonormal basis V.
+    `stiffness` is V^T K V (m, m) with the orthonormal basis V.
     """
 
     def __init__(self, modes: Modes, elastic: Array, room: int) -> None:

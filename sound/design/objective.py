@@ -18,17 +18,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from solver.subspace.spectrum import clusters
-from sound.design.bark import bark, bark_slope
+from sound.design.pitch import bark, bark_slope
 
 if TYPE_CHECKING:
     from sound.clips.targets import Targets
     from sound.project.settings import Weights
 
-Index = NDArray[np.int64]
 
 RESOLVED = 3e-3
 """Standard deviation of the average over neighbouring modes, over their frequency: about the least
@@ -44,14 +42,9 @@ TINY = 1e-30
 class Sensitivity:
     """Derivatives of eigenpairs by m coordinates, projected on pairs of modes and struck points.
 
-    Attributes
-    ----------
-    pairs : (P, 2)
-        Numbers i <= j of elastic modes of close eigenvalues, first all with i = j.
-    stiffness : (m, P) [rad^2/s^2]
-        u_i^T (dK/dz) u_j of these pairs.
-    outside : (m, T, N)
-        Part of the derivative of each pushed mode outside of the modes close to it.
+    `pairs` (P, 2) are numbers i <= j of elastic modes of close eigenvalues, first all with i = j,
+    and `stiffness` (m, P) [rad^2/s^2] is u_i^T (dK/dz) u_j of these.  `outside` (m, T, N) is the
+    part of the derivative of each pushed mode outside of the modes close to it.
     """
 
     pairs: Index
@@ -70,16 +63,10 @@ class DesignCost:
 
 
 class Objective:
-    """Eq. (1) to (4) for N elastic modes and T struck points.
+    """Eq. (1) to (4) for N elastic modes and T struck points, with the weights w_f, w_a and w_r.
 
-    Parameters
-    ----------
-    targets
-        Modes that the points shall have.
-    weights
-        w_f, w_a and w_r.
-    shift : (T, N) or None
-        Shift of the targets' balances of amplitudes.
+    `targets` are the modes that the points shall have; `shift` (T, N) is added to their balances of
+    amplitudes.
     """
 
     def __init__(self, targets: Targets, weights: Weights, shift: Array | None = None) -> None:
@@ -100,16 +87,8 @@ class Objective:
         return np.asarray(self.balance(eigenvalues, pushed) - self._target)
 
     def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> DesignCost:
-        """Eq. (4).
-
-        Parameters
-        ----------
-        eigenvalues : (N,) [rad^2/s^2]
-            Eigenvalues of the elastic modes, ascending.
-        pushed : (T, N) [kg^-1/2 N s]
-            u_k^T f of a unit impulse f along the inward normals.
-        regulariser : float
-            R.
+        """Eq. (4), from ascending elastic eigenvalues (N,) [rad^2/s^2], R, and u_k^T f (T, N)
+        [kg^-1/2 N s] of unit impulses f along the inward normals.
         """
         frequency = 0.5 * float(np.sum(self.frequency_residual(eigenvalues) ** 2))
         amplitude = 0.5 * float(np.sum(self.amplitude_residual(eigenvalues, pushed) ** 2))

@@ -41,23 +41,17 @@ def optimise(
 
     Parameters
     ----------
-    problem
-        Problem of the project.
-    initial
-        Design to go on from, of the same mesh; its targets may differ.
-    keep
-        Called with the best design so far every `keep_seconds`, if it is a new one.
+    problem, initial
+        Problem of the project; design to go on from, of the same mesh, whose targets may differ.
+    keep, keep_seconds : float or None [s]
+        Called with the best design so far so many seconds (`KEEP_SECONDS`), if it is new.
     watch
         Called after every round of evaluations; ends the search by returning True.
-    keep_seconds : float or None [s]
-        `KEEP_SECONDS` if None.
     follow
         Called from another thread with every step of a descent and the frequencies (N,) [Hz] of the
         design then, in the order of the modes of the search.
-    coordinates : (m,) or None
-        Coordinates of the start, instead of the initial design's.
-    history : structured array of HISTORY_TYPE or None
-        History of the start, instead of the initial design's.
+    coordinates, history : (m,), structured array of HISTORY_TYPE, or None
+        Coordinates and history of the start, instead of the initial design's.
 
     Raises
     ------
@@ -91,13 +85,13 @@ def optimise(
         return outcome.of_checked(search, mapping.best)
 
     def pool(tell: Callable[[SearchStep], None]) -> Pool:
-        def told(step: SearchStep) -> None:
+        def pass_on(step: SearchStep) -> None:
             tell(step)
             if follow is not None:
                 own = frequencies(step.eigenvalues)
                 follow(step, own if mapping is None else mapping.foretold(step))
 
-        return Pool(setting, problem.workers, told)
+        return Pool(setting, problem.workers, pass_on)
 
     kept: float = time.monotonic()
     known: object = None

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
-from sound.design.gauss_newton import StepOptions
-from sound.design.limited_memory import LimitedMemory
+from sound.design.local_search import LimitedMemory, StepOptions
 from sound.design.reduced_model import TrustRegion
 from sound.design.search import Search
 from sound.design.tasks import Task, Trial
@@ -113,7 +112,6 @@ OPTIMISERS = {"hybrid": hybrid, "cma": evolution, "bfgs": quasi_newton}
 
 
 def _continued(lane: Task, trial: Trial) -> Task:
-    """The task to go on with after a descent."""
     damping = None if trial.descent is None else trial.descent.damping
     return replace(lane, z=trial.z, start=trial.start, damping=damping)
 

@@ -1,4 +1,12 @@
-"""Outcome of a search: the better of its best and its first material, analysed precisely."""
+"""Outcome of a search: the better of its best and its first material, analysed precisely.
+
+Loss factors of the material's regions are fitted to the dampings of the clips.  The loss factor of
+a material is the share of its strain energy that a radian of vibration loses.  A mode loses the
+energy that its regions lose, each by its share s_r of the mode's strain energy (modal strain energy
+method; Johnson and Kienholz, AIAA Journal 20, 1982):
+
+    d = alpha / 2 + omega / 2 sum_r eta_r s_r .
+"""
 
 from __future__ import annotations
 
@@ -9,25 +17,31 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
+from carillon.fem.geometry import HexMesh
+from carillon.limits import DENSITIES
 from carillon.processes.threads import one_thread
+from solver.distribution.partition import partition_cells
 from solver.files.modes_file import frequencies
-from sound.design.cents import common_factor
-from sound.design.damping import material_damping
 from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
-from sound.design.plausible import weight
+from sound.design.pitch import common_factor
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search, require_modes
 from sound.design.simulation import Evaluation, Simulation
 from sound.design.space_mapping import Checked
 from sound.design.tasks import Trial
-from sound.project.design import HISTORY_TYPE, Design, FineFrequencies
+from sound.project.design import HISTORY_TYPE, Design, FineFrequencies, MaterialDamping
 
 FINAL_TOLERANCE = 1e-12
 """Relative error of a design's eigenvalues; its square root is that of the modes and the cost."""
+ALIKE = 1e-4
+"""Weight of the differences between loss factors.  It is small, and makes equal those that dampings
+do not distinguish, such as of the two ends of a bar."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +76,7 @@ class Outcome:
     def of(self, search: Search) -> Design:
         """The best design of a search so far, by analyses of the solid of the search.
 
-        Raises
-        ------
-        UserError
-            If the material to start from has no modes.
+        Raises UserError if the material to start from has no modes.
         """
         first, best = require_modes(search), search.best
         start = self._start = self._start or self._analysed(first)
@@ -80,10 +91,7 @@ class Outcome:
     def checked(self, trial: Trial) -> Checked:
         """A trial's material, analysed on the solid of the search and on the fine solid.
 
-        Raises
-        ------
-        ConvergenceError
-            If it has no modes on one of them.
+        Raises ConvergenceError if it has no modes on one of them.
         """
         evaluation = self._analysed(trial).evaluation
         return Checked(evaluation, self._fine_solid.modes(evaluation))
@@ -166,3 +174,73 @@ def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:
     """Rows of a design's history."""
     rows = [(each.seconds, each.evaluations, *astuple(each.cost)) for each in history]
     return np.array(rows, HISTORY_TYPE)
+
+
+def weight(moduli: Array, density: float, bounds: Sequence[float] | None) -> float:
+    """Factor of moduli (M,) [Pa] and density [kg/m^3], nearest to 1, for moduli within bounds (2,)
+    [Pa].
+
+    Frequencies depend on moduli over density, so a factor common to both is free; the loudness of a
+    design is that of its clips, whatever the density.  If the moduli span more than the bounds do,
+    the geometric mean of their extremes becomes that of the bounds.  The density stays within
+    `carillon.limits.DENSITIES`.  Without bounds it is 1.
+
+    Examples
+    --------
+    >>> weight(np.array([1e12, 4e13]), 1000.0, (1e9, 4e11))
+    0.01
+    >>> weight(np.array([2e9, 4e10]), 1000.0, (1e9, 4e11))
+    1.0
+    """
+    if bounds is None:
+        return 1.0
+    least, most = bounds[0] / moduli.min(), bounds[1] / moduli.max()
+    factor = np.clip(1.0, least, most) if least <= most else np.sqrt(least * most)
+    return float(np.clip(factor, DENSITIES[0] / density, DENSITIES[1] / density))
+
+
+def material_damping(
+    simulation: Simulation,
+    evaluation: Evaluation,
+    mesh: HexMesh,
+    regions: int,
+    hertz: Array,
+    order: NDArray[np.integer],
+    targets: Array,
+) -> MaterialDamping:
+    """Loss factors that bring the dampings of a material's modes near to the targets (N,) [1/s].
+
+    There are so many regions of the voxels with a loss factor each; they depend on the solid alone.
+    The modes have the frequencies `hertz` (N,) [Hz], and the numbers `order` (N,) in the
+    evaluation.
+    """
+    labels = partition_cells(mesh, min(regions, mesh.n_cells))
+    shares = simulation.energy_shares(evaluation, labels)[order]
+    factors, mass = fitted_loss_factors(shares, hertz, targets)
+    dampings = 0.5 * mass + np.pi * hertz * (shares @ factors)
+    return MaterialDamping(factors[labels], mass, np.maximum(dampings, 0.0))
+
+
+def fitted_loss_factors(shares: Array, hertz: Array, targets: Array) -> tuple[Array, float]:
+    """Loss factors (R,) and alpha [1/s], none negative, for dampings nearest to targets (N,) [1/s].
+
+    `shares` (N, R) are those of the regions in the modes' strain energies, `hertz` (N,)
+    frequencies. Least squares of relative differences, so that large dampings do not outweigh small
+    ones.
+
+    Examples
+    --------
+    >>> shares, hertz = np.array([[0.9, 0.1], [0.2, 0.8], [0.5, 0.5]]), np.array([1e2, 2e2, 3e2])
+    >>> targets = np.pi * hertz * (shares @ np.array([0.01, 0.03]))
+    >>> factors, mass = fitted_loss_factors(shares, hertz, targets)
+    >>> factors.round(6).tolist(), round(mass, 6)
+    ([0.01, 0.03], 0.0)
+    """
+    lost = np.pi * hertz[:, None] * shares / targets[:, None]
+    regions = shares.shape[1]
+    differences = ALIKE * np.linalg.norm(lost) * (np.eye(regions) - 1.0 / regions)
+    columns = np.column_stack(
+        [np.concatenate([lost, differences]), np.append(0.5 / targets, np.zeros(regions))]
+    )
+    solution = nnls(columns, np.append(np.ones(len(targets)), np.zeros(regions)))[0]
+    return solution[:-1], float(solution[-1])

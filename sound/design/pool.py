@@ -22,8 +22,7 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.processes import children
 from carillon.processes.threads import one_thread
 from sound.design.descent import Descent, DesignDescent, cost_of, normal_equations
-from sound.design.gauss_newton import StepOptions, descend
-from sound.design.limited_memory import LimitedMemory, descend_by_gradients
+from sound.design.local_search import LimitedMemory, StepOptions, descend, descend_by_gradients
 from sound.design.objective import DesignCost
 from sound.design.reduced_model import TrustRegion, descend_by_model
 from sound.design.simulation import Evaluation, Simulation
@@ -40,10 +39,8 @@ class InterruptedRoundError(Exception):
 class Pool:
     """Processes that evaluate materials; this one alone if `workers` is 1.
 
-    Parameters
-    ----------
-    tell
-        Called with every step of a descent, from another thread if there are several processes.
+    `tell` is called with every step of a descent, from another thread if there are several
+    processes.
     """
 
     def __init__(
@@ -55,34 +52,25 @@ class Pool:
             self._held.enter_context(one_thread())
             _prepare(setting, tell)
             return
-        told = None
+        steps = None
         if tell is not None:
-            told = children.CONTEXT.SimpleQueue()
-            Thread(target=_pass_on, args=(told, tell), daemon=True).start()
+            steps = children.CONTEXT.SimpleQueue()
+            Thread(target=_pass_on, args=(steps, tell), daemon=True).start()
         # What processes are started with has to fit into a pipe, or one that died before it had
         # read all would be waited for. So they read the setting from a file, which has no name.
         file = self._held.enter_context(TemporaryFile())
         pickle.dump(setting, file)
         file.flush()
         path = f"/proc/{os.getpid()}/fd/{file.fileno()}"
-        self._pool = children.ProcessPool(workers, _prepare_apart, path, told)
+        self._pool = children.ProcessPool(workers, _prepare_apart, path, steps)
 
     def run(
         self, tasks: Sequence[Task], interrupted: Callable[[], bool] | None = None
     ) -> list[Trial]:
         """What becomes of the tasks, in their order.
 
-        Parameters
-        ----------
-        interrupted
-            Asked now and then where there are several processes.
-
-        Raises
-        ------
-        InterruptedRoundError
-            If `interrupted` says so before all is done.
-        UserError
-            If a process died.
+        Raises InterruptedRoundError if `interrupted`, which is asked now and then where there are
+        several processes, says so before all is done, and UserError if a process died.
         """
         if self._pool is None:
             return [_run(task) for task in tasks]
@@ -112,17 +100,16 @@ _tell: Callable[[SearchStep], None] | None
 _for_good = ExitStack()
 
 
-def _pass_on(told: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) -> None:
-    """Tell what processes put into a queue, for as long as this one lives."""
+def _pass_on(steps: SimpleQueue[SearchStep], tell: Callable[[SearchStep], None]) -> None:
     while True:
-        tell(told.get())
+        tell(steps.get())
 
 
-def _prepare_apart(path: str, told: SimpleQueue[SearchStep] | None) -> None:
+def _prepare_apart(path: str, steps: SimpleQueue[SearchStep] | None) -> None:
     _for_good.enter_context(one_thread())
     with open(path, "rb") as file:
         setting = pickle.load(file)
-    _prepare(setting, None if told is None else told.put)
+    _prepare(setting, None if steps is None else steps.put)
 
 
 def _prepare(setting: Setting, tell: Callable[[SearchStep], None] | None) -> None:
@@ -133,7 +120,6 @@ def _prepare(setting: Setting, tell: Callable[[SearchStep], None] | None) -> Non
 
 @cache
 def _fine_simulation() -> Simulation:
-    """That of the fine solid, which not every search looks at."""
     return _setting.fine().simulation()
 
 
@@ -156,15 +142,14 @@ def _run(task: Task) -> Trial:
 
 
 def _telling(fine: bool) -> Callable[[Evaluation, DesignCost], None] | None:
-    """What a descent calls with the materials that it comes to."""
     tell = _tell
     if tell is None:
         return None
 
-    def told(evaluation: Evaluation, cost: DesignCost) -> None:
+    def pass_on(evaluation: Evaluation, cost: DesignCost) -> None:
         tell(SearchStep(evaluation.z, cost, evaluation.eigenvalues, fine))
 
-    return told
+    return pass_on
 
 
 def _descent(

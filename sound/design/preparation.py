@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Surface
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
@@ -17,17 +17,14 @@ from solver.analysis.problem import ProblemOptions, discretised
 from solver.analysis.solid_surface import SolidSurface
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies, without_modes
-from sound.design.material import ReducedMaterial
+from sound.clips.wav import read_wav
+from sound.design.material import FreePoisson, ReducedMaterial
 from sound.design.objective import Objective
-from sound.design.poisson import FreePoisson
 from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
-from sound.project.usable import usable_strikes
-
-if TYPE_CHECKING:
-    import trimesh
+from sound.strikes import Strike
 
 
 @dataclass(frozen=True)
@@ -48,11 +45,8 @@ class DesignProblem:
 def targets_of(project: Project) -> Targets:
     """Targets from the project's clips.
 
-    Raises
-    ------
-    UserError
-        If a clip is unusable, or all together have fewer modes than the project asks for, or
-        than a design needs.
+    Raises UserError if a clip is unusable, or all together have fewer modes than the project asks
+    for, or than a design needs.
     """
     sounds = [
         without_modes(
@@ -65,35 +59,22 @@ def targets_of(project: Project) -> Targets:
 
 @dataclass(frozen=True)
 class PreparedSolid:
-    """The solid of a search, without targets.
-
-    Attributes
-    ----------
-    surface
-        Struck surface.
-    mesh
-        Voxels.
-    material
-        Moduli of the voxels as a function of coordinates.
-    cells
-        Finite cells with these voxels; None if there are none.
+    """The solid of a search, without targets: its struck surface, its voxels, and their moduli as a
+    function of coordinates; finite cells with these voxels, or None.
     """
 
-    surface: trimesh.Trimesh
+    surface: Surface
     mesh: HexMesh
     material: ReducedMaterial
     cells: FiniteCells | None
 
 
 def prepared_solid(
-    solid: ProblemOptions, material: MaterialSettings, surface: trimesh.Trimesh
+    solid: ProblemOptions, material: MaterialSettings, surface: Surface
 ) -> PreparedSolid:
     """Voxels and reduced material of a solid whose `surface` is struck.
 
-    Raises
-    ------
-    UserError
-        For anything wrong with the mesh or the numbers.
+    Raises UserError for anything wrong with the mesh or the numbers.
     """
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
     loaded = SolidSurface.read(solid.mesh, solid.unit)
@@ -112,18 +93,9 @@ def prepare(
 ) -> DesignProblem:
     """Mesh, material and objective of a project, whose `modes` are then a number.
 
-    Parameters
-    ----------
-    targets
-        Targets; those of the project's clips if None.
-    solid
-        Solid of the project, if it is prepared already.
-
-    Raises
-    ------
-    UserError
-        For anything wrong with the mesh, the points, the clips or the numbers.  The faults of all
-        targets are named, before any clip is searched.
+    The targets are those of the project's clips unless given, and so is its solid.  Raises
+    UserError for anything wrong with the mesh, the points, the clips or the numbers.  The faults of
+    all targets are named, before any clip is searched.
     """
     surface = project.surface() if solid is None else solid.surface
     if targets is None:
@@ -141,10 +113,7 @@ def prepare(
 def require_same_voxels(problem: DesignProblem, initial: Design) -> None:
     """Check that a project can go on from an initial design.
 
-    Raises
-    ------
-    UserError
-        If the initial design is of other voxels.
+    Raises UserError if the initial design is of other voxels.
     """
     mesh = problem.setting.mesh
     if not np.array_equal(initial.fine_grid, mesh.grid):
@@ -157,10 +126,7 @@ def require_same_voxels(problem: DesignProblem, initial: Design) -> None:
 def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     """Coordinates (m,) of the material nearest to that of an initial design.
 
-    Raises
-    ------
-    UserError
-        If the initial design is of other voxels.
+    Raises UserError if the initial design is of other voxels.
     """
     require_same_voxels(problem, initial)
     material = problem.setting.material
@@ -174,3 +140,39 @@ def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     if same and len(initial.coordinates) == material.dimensions:
         return initial.coordinates
     return material.coordinates(initial.young, initial.model.poisson)
+
+
+def usable_strikes(project: Project, surface: Surface) -> list[Strike]:
+    """The points of a project's targets on its `surface`, all of which can be used.
+
+    Raises UserError with a sentence for everything that is wrong with any target: names that
+    several have, clips that are not there or no sound, points that are not on the surface.
+    """
+    counts = Counter(target.name for target in project.targets)
+    faults = [
+        f"{count} targets are named {name!r}; give each a name of its own"
+        for name, count in counts.items()
+        if count > 1
+    ]
+    faults += _unreadable_clips(project)
+    try:
+        strikes = project.strikes(surface)
+    except UserError as error:
+        faults += error.args
+    if faults:
+        raise UserError(*faults)
+    return strikes
+
+
+def _unreadable_clips(project: Project) -> list[str]:
+    """A sentence for each clip that is no sound; several targets may have the same."""
+    clips: dict[tuple[str, bool], list[str]] = {}
+    for target in project.targets:
+        clips.setdefault((target.clip, target.allow_clipped), []).append(repr(target.name))
+    faults = []
+    for (clip, allow_clipped), names in clips.items():
+        try:
+            read_wav(clip, allow_clipped)
+        except UserError as error:
+            faults.append(f"target{'s' * (len(names) > 1)} {', '.join(names)}: {error}")
+    return faults

@@ -18,9 +18,9 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from sound.clips.targets import Targets
-from sound.design.cents import cents
 from sound.design.descent import DescentLimits
 from sound.design.objective import Objective, Sensitivity
+from sound.design.pitch import cents
 from sound.design.pool import Pool
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.reduced_model import TrustRegion
@@ -51,24 +51,11 @@ AT_ONCE = 8
 
 @dataclass(frozen=True)
 class ModeReach:
-    """How near a mode gets to its target.
+    """How near the mode of a number from 1 on gets to its target [Hz], relative to the first mode.
 
-    All distances are of frequencies relative to the first mode.
-
-    Attributes
-    ----------
-    mode : int
-        Number of the mode from 1 on.
-    target_hz : float [Hz]
-        Target.
-    cents : float [cents]
-        Distance of the design above the target.
-    alone_cents : float [cents]
-        Least distance found; 0 if the target can be met.
-    beside_cents : float [cents]
-        Least distance found of the mode and its two neighbours together, the largest of the three.
-    verdict : str
-        Verdict.
+    The design is `cents` above the target.  `alone_cents` is the least distance found, 0 if the
+    target can be met, `beside_cents` that of the mode and its two neighbours together, the largest
+    of the three.
     """
 
     mode: int
@@ -81,18 +68,10 @@ class ModeReach:
 
 @dataclass(frozen=True)
 class Reach:
-    """Reach of a solid.
+    """Reach of a solid, mode by mode from the second one on.
 
-    Attributes
-    ----------
-    modes
-        Reach of each mode from the second one on.
-    together : int
-        Number of modes from the first one on whose targets one material meets together.
-    seconds : float [s]
-        Duration.
-    had_cents : float [cents]
-        Greatest distance that counts as met.
+    One material meets the targets of the first so many modes `together`.  Distances up to
+    `had_cents` count as met; the search took so many `seconds`.
     """
 
     modes: list[ModeReach]
@@ -102,15 +81,7 @@ class Reach:
 
 
 class SomeModes(Objective):
-    """Objective of the frequencies of some modes relative to the first one.
-
-    Parameters
-    ----------
-    targets
-        Targets of all modes.
-    modes
-        Numbers of the modes that count, 1 for the second mode.
-    """
+    """Objective of the frequencies of some modes, 1 being the second one, relative to the first."""
 
     def __init__(self, targets: Targets, modes: Sequence[int]) -> None:
         super().__init__(targets, Weights(1.0, 0.0, 0.0))
@@ -126,12 +97,8 @@ class SomeModes(Objective):
 
 
 class _Known:
-    """Materials whose modes are known.
-
-    Attributes
-    ----------
-    off : (k, N) [cents]
-        Distances of modes above their targets, with the first mode at its target.
+    """Materials whose modes are known, with distances `off` (k, N) [cents] of these above their
+    targets, the first mode being at its target.
     """
 
     def __init__(self, targets: Array) -> None:
@@ -162,21 +129,11 @@ class _Known:
 def reach(problem: DesignProblem, design: Design, seconds: float | None, descents: int) -> Reach:
     """Reach of each mode from the second one on, on the fine solid.
 
-    Parameters
-    ----------
-    problem
-        Problem of the design's project, with the design's targets.
-    design
-        Design.  If it meets all targets, there is no search.
-    seconds : float or None [s]
-        Time in which descents begin, half of it for modes from the first one on; no limit if None.
-    descents : int
-        Greatest number of descents for each question, each from another one of the best materials.
-
-    Raises
-    ------
-    UserError
-        See `coordinates_of`; or if a process died, or there are no modes to be had.
+    The problem is that of the design's project, with the design's targets; if it meets them all,
+    there is no search.  Descents begin within so many seconds, half of it for modes from the first
+    one on, without a limit if None.  Each question has so many descents at most, each from another
+    one of the best materials.  Raises UserError as `coordinates_of` does, or if a process died, or
+    there are no modes to be had.
     """
     begin = time.monotonic()
     targets = problem.setting.objective.targets.frequencies
@@ -200,12 +157,8 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
 class _Descents:
     """Descents on the fine solid by the frequencies of some modes only.
 
-    Attributes
-    ----------
-    known
-        Materials that were analysed.
-    sought
-        Groups of modes whose descents all ended in time.
+    `known` are the materials that were analysed, `sought` the groups of modes whose descents all
+    ended in time.
     """
 
     def __init__(self, problem: DesignProblem, most: int) -> None:

@@ -37,24 +37,16 @@ SMALLEST = 1e-4
 
 @dataclass(frozen=True)
 class TrustRegion:
-    """Options of a descent by steps of a reduced model.
-
-    Attributes
-    ----------
-    radius
-        Greatest root mean square change of Phi z in the first step.
+    """Options of a descent by steps of a reduced model: the `radius` is the greatest root mean
+    square change of Phi z in the first step.
     """
 
     radius: float
 
 
 class ReducedModel:
-    """Modes near a material, in the span of its own.
-
-    Parameters
-    ----------
-    evaluation
-        Modes of the material, with derivatives of all pairs.
+    """Modes near a material, in the span of its own, from an evaluation with derivatives of all
+    pairs.
     """
 
     def __init__(self, evaluation: Evaluation) -> None:
@@ -124,12 +116,8 @@ def descend_by_model(
 ) -> DesignDescent:
     """Up to `steps` steps from z, each of which lowers the whole of Eq. (4) or the radius.
 
-    The damping of the result is the radius of the next step.
-
-    Raises
-    ------
-    ConvergenceError
-        If the first material has no modes.
+    The damping of the result is the radius of the next step.  Raises ConvergenceError if the first
+    material has no modes.
     """
     descent.begin(z, start, (radius,), derivatives=False)
     record = descent.record
@@ -148,7 +136,6 @@ def descend_by_model(
 
 
 def _step(descent: Descent, model: ReducedModel, radius: float) -> float:
-    """Try a step, and take it if it lowers the cost; the radius of the next one."""
     before = descent.record.cost.total
     move, predicted = model.best_move(descent, radius)
     length = float(np.linalg.norm(move))

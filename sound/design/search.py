@@ -43,19 +43,13 @@ class HistoryEntry:
 
 @dataclass(frozen=True)
 class CheckEntry:
-    """Result of a check of a material on the fine solid.
+    """Result of a check of a material on the fine solid, after some time and evaluations of the
+    search.
 
-    Attributes
-    ----------
-    seconds, evaluations
-        Time and evaluations of the search so far.
-    coarse_rms_cents, fine_rms_cents : float [cents]
-        Root mean square distances of coarse and fine frequencies from the targets, each up to the
-        best common factor.
-    foretold_rms_cents : float [cents]
-        Root mean square distance of the fine frequencies from those that the search expected.
-    cost : float
-        Cost of the fine solid, Eq. (4).
+    `coarse_rms_cents` and `fine_rms_cents` are root mean square distances of coarse and fine
+    frequencies from the targets, each up to the best common factor; `foretold_rms_cents` is that of
+    the fine frequencies from those that the search expected.  `cost` is that of the fine solid, Eq.
+    (4).
     """
 
     seconds: float
@@ -67,38 +61,31 @@ class CheckEntry:
 
 
 class Search:
-    """Runs tasks until the budget is spent.
+    """Runs tasks until the budget of time [s] and of evaluations is spent; None sets no limit.
+
+    Descents that run side by side get equal shares of the evaluations that are left, so their
+    results do not depend on which one is faster.
 
     Parameters
     ----------
     make_pool
         Makes the pool of processes, from a function that receives their steps; its start counts as
         time of the search.
-    seconds : float or None [s]
-        Budget of time; None sets no limit.
-    evaluations : int or None
-        Budget of evaluations.  Descents that run side by side get equal shares of the evaluations
-        that are left, so their results do not depend on which one is faster.
-    watch
-        Called after every round of tasks; ends the search by returning True.
+    watch, interrupted
+        Called after every round of tasks, and during it; each ends the search by returning True.
+        Of an interrupted round the best step is kept, but its evaluations do not count.
     before : (float [s], int)
         Time and evaluations of former searches that this one continues.
-    interrupted
-        Called during a round; ends the search by returning True.  The best step of the round is
-        kept, but its evaluations do not count.
 
     Attributes
     ----------
-    best
-        Best trial of the present leg.
-    start
-        First trial of all.
-    history
-        Best cost over time; it may rise where a leg begins.
+    best, start
+        Best trial of the present leg, and first trial of all.
+    history, checks
+        Best cost over time, which may rise where a leg begins; checks on the fine solid, see
+        `sound.design.space_mapping`.
     spent
         Whether the whole budget is used up, or an interrupt came.
-    checks
-        Checks on the fine solid, see `sound.design.space_mapping`.
     """
 
     def __init__(
@@ -172,13 +159,9 @@ class Search:
             self._leg_most = self._most if self._is_last else self._done + evaluations
 
     def run(self, tasks: Sequence[Task]) -> list[Trial]:
-        """Run tasks.
+        """Run tasks; of those that the budget of the leg does not suffice for, the first ones.
 
-        Raises
-        ------
-        BudgetSpentError
-            If the budget of the leg is spent, before or after; the best trial is in `best`.  If it
-            suffices for the first tasks only, these are run.
+        Raises BudgetSpentError if that is spent, before or after; the best trial is in `best`.
         """
         affordable = self._affordable(tasks)
         if not affordable or time.monotonic() >= self._leg_deadline:
@@ -202,7 +185,6 @@ class Search:
             self._step = step
 
     def _break_off(self) -> NoReturn:
-        """End in the middle of a round with the best of its steps."""
         step = self._step
         if step is not None:
             self._record([Trial(step.z, step.cost, 0, eigenvalues=step.eigenvalues)])
@@ -214,7 +196,6 @@ class Search:
         raise BudgetSpentError
 
     def _affordable(self, tasks: Sequence[Task]) -> list[Task]:
-        """The first tasks that the budget suffices for, with their limits."""
         tasks = [replace(task, objective=self._objective) for task in tasks]
         deadline = self._leg_deadline
         if self._leg_most is None:
@@ -228,7 +209,6 @@ class Search:
         ]
 
     def _record(self, trials: Sequence[Trial]) -> None:
-        """Add trials to the history in the order of time."""
         now = time.monotonic()
         costs = []
         lowest = np.inf if self.best is None else self.history[-1].cost.total

@@ -13,9 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
-
-Index = NDArray[np.int64]
+from carillon.arrays import Array, Index
 
 POINTS_AT_ONCE = 1024
 """Number of elements' points whose strain energies are held in memory together."""
@@ -33,29 +31,18 @@ def projected_stiffness(
     others: Array,
     slopes: Array,
 ) -> tuple[Array, Array]:
-    """u_i^T (dK/dz) u_j of some pairs of modes, and u_i^T (dK/dz) x_i with further vectors x.
+    """u_i^T (dK/dz) u_j (m, P) of pairs of modes, and u_i^T (dK/dz) x_i (m, T, N) with vectors x.
 
     Parameters
     ----------
-    nodes : (c, k)
-        Nodes of the elements.
-    strains : (p, 6, 3 k)
-        See `sound.design.elements.AnalysedElements.strains`.
-    vectors : (3 n, N)
-        Modes u.
-    pairs : (P, 2)
-        Numbers i and j, see `close_pairs`.
+    nodes, strains : (c, k), (p, 6, 3 k)
+        Nodes of the elements; see `sound.design.elements.AnalysedElements.strains`.
+    vectors, pairs : (3 n, N), (P, 2)
+        Modes u, and their numbers i and j, see `close_pairs`.
     others : (3 n, T, N)
         Vectors x, T for each mode.
     slopes : (p c, m)
         Derivatives of the moduli at the elements' points.
-
-    Returns
-    -------
-    inside : (m, P)
-        u_i^T (dK/dz) u_j.
-    beyond : (m, T, N)
-        u_i^T (dK/dz) x_i.
     """
     count, struck, points = vectors.shape[1], others.shape[1], len(strains)
     total = np.zeros((slopes.shape[1], len(pairs) + struck * count))
@@ -85,16 +72,8 @@ def all_pairs(count: int) -> Index:
 def inside_response(elastic: Array, values: Array, pushed: Array) -> Array:
     """x (3 n, T, N), the sums of u_j (u_j^T f_p) / (lambda_k - lambda_j) over computed modes j.
 
-    Modes close to k are left out.
-
-    Parameters
-    ----------
-    elastic : (3 n, N)
-        Modes u.
-    values : (N,) [rad^2/s^2]
-        Eigenvalues.
-    pushed : (T, N)
-        u_j^T f_p.
+    `elastic` (3 n, N) are the modes u, `values` (N,) [rad^2/s^2] their eigenvalues, and `pushed`
+    (T, N) is u_j^T f_p.  Modes close to k are left out.
     """
     other, own = values[:, None], values[None, :]
     close = _are_close(other, own)

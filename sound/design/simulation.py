@@ -23,10 +23,9 @@ from solver.analysis.problem import ProblemOptions
 from solver.linear import Inverse, Lasting
 from solver.response.points import forces_at
 from sound.design.elements import analysed_elements
-from sound.design.material import ReducedMaterial
+from sound.design.material import FIRST, SECOND, ReducedMaterial, elasticity_slope
 from sound.design.modal_truncation import lies_between, outside_response, shift_between
 from sound.design.objective import Sensitivity
-from sound.design.poisson import FIRST, SECOND, elasticity_slope
 from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
 from sound.strikes import Strike
 
@@ -39,22 +38,12 @@ eigenvalues."""
 
 @dataclass
 class Evaluation:
-    """The modes of one material.
+    """The modes of the material of coordinates z (m,).
 
-    Attributes
-    ----------
-    z : (m,)
-        Coordinates of the material.
-    eigenvalues : (N,) [rad^2/s^2]
-        Eigenvalues of the elastic modes, ascending.
-    pushed : (T, N) [kg^-1/2 N s]
-        u_k^T f of a unit impulse f along the inward normal at each point.
-    modes
-        All modes of the analysis, as a start of the next one.
-    sensitivity
-        Derivatives; None if they were not computed.
-    inverse
-        (K - mu M)^-1 of this material; None if the analysis made none.
+    `eigenvalues` (N,) [rad^2/s^2] of the elastic modes ascend; `pushed` (T, N) [kg^-1/2 N s] is
+    u_k^T f of a unit impulse f along the inward normal at each point.  `modes` are all of the
+    analysis, as a start of the next one.  `sensitivity`, the derivatives, and `inverse`, (K - mu
+    M)^-1 of this material, are None if they were not computed.
     """
 
     z: Array
@@ -66,24 +55,16 @@ class Evaluation:
 
 
 class Simulation:
-    """Modes of a solid for any coordinates of its material.
+    """Elastic modes, `modes` in number, of a solid for any coordinates of its material.
 
     Parameters
     ----------
-    mesh
-        Voxels.
-    options
-        Constants, coarsening and forests.
-    material
-        Moduli as a function of the coordinates.
-    strikes
-        Struck points.
-    modes
-        Number N of elastic modes.
-    tolerance
-        Relative error of the eigenvalues.
-    cells
-        Finite cells with these voxels; None if there are none.
+    mesh, cells
+        Voxels, and finite cells with these voxels if there are any.
+    options, material
+        Constants, coarsening and forests; moduli as a function of the coordinates.
+    strikes, tolerance
+        Struck points; relative error of the eigenvalues.
 
     Attributes
     ----------
@@ -120,14 +101,8 @@ class Simulation:
     def evaluate(
         self, z: Array, start: Modes | Array | None = None, derivatives: bool = False
     ) -> Evaluation:
-        """Modes at the coordinates z.
-
-        Parameters
-        ----------
-        start
-            Modes at near coordinates, as a start of the analysis.
-        derivatives
-            Whether derivatives are computed.
+        """Modes at the coordinates z, with derivatives if asked for; those at near ones are a
+        `start`.
         """
         self.evaluations += 1
         young = self.material.moduli(z)
@@ -209,21 +184,13 @@ class Simulation:
         return np.concatenate([strains, *further]), by_cell.reshape(-1, slopes.shape[1])
 
     def energy_shares(self, evaluation: Evaluation, regions: NDArray[np.integer]) -> Array:
-        """Shares (N, R) of R regions in the modes' strain energies.
+        """Shares (N, R) of R regions in the modes' strain energies, from the region (M,) of each
+        voxel.
 
         The share of a region is the derivative of log(lambda) by the logarithm of a factor of its
         moduli.  The stiffness is linear in a factor of all moduli, through any coarsening, so the
         shares of a mode add up to 1; for elements across regions, one may be slightly negative.
-
-        Parameters
-        ----------
-        regions : (M,)
-            Region of each voxel, from 0 to R - 1.
-
-        Raises
-        ------
-        UserError
-            If the coarsening has no derivatives.
+        Raises UserError if the coarsening has no derivatives.
         """
         young = self.material.moduli(evaluation.z)
         own = young[:, None] * (regions[:, None] == np.arange(regions.max() + 1))

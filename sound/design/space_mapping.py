@@ -18,10 +18,10 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.files.modes_file import frequencies
-from sound.design.cents import rms_cents
 from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
 from sound.design.optimisers import descend_finely
+from sound.design.pitch import rms_cents
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 from sound.design.tasks import SearchStep, Trial
@@ -80,17 +80,8 @@ def aimed(objective: Objective, fine: FineModes) -> Objective:
 class SpaceMapping:
     """Legs of a coarse search, with a check on the fine solid after each.
 
-    Parameters
-    ----------
-    objective
-        Objective of the fine solid.
-    check
-        Analyses a trial's material on both solids.
-
-    Attributes
-    ----------
-    best
-        Best material by its cost on the fine solid.
+    The objective is that of the fine solid, and `check` analyses a trial's material on both solids.
+    `best` is the best material by its cost on the fine one.
     """
 
     def __init__(self, objective: Objective, check: Callable[[Trial], Checked]) -> None:
@@ -139,7 +130,6 @@ class SpaceMapping:
 
     @property
     def _met(self) -> bool:
-        """Whether the best material's frequencies are near enough to their targets."""
         assert self.best is not None
         off = rms_cents(self.best.fine.frequencies, self._objective.targets.frequencies)
         return off <= MET_CENTS

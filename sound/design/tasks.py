@@ -12,8 +12,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from solver.analysis.problem import ProblemOptions
 from sound.design.descent import DescentLimits, DesignDescent
-from sound.design.gauss_newton import StepOptions
-from sound.design.limited_memory import LimitedMemory
+from sound.design.local_search import LimitedMemory, StepOptions
 from sound.design.material import ReducedMaterial
 from sound.design.objective import DesignCost, Objective
 from sound.design.reduced_model import TrustRegion
@@ -44,9 +43,9 @@ class Setting:
         """The setting without coarsening."""
         return replace(self, options=replace(self.options, coarsen="none"))
 
-    def simulation(self, tolerance: float = TOLERANCE) -> Simulation:
-        """Simulation of the solid, on all threads of this process."""
-        modes = len(self.objective.targets.frequencies)
+    def simulation(self, tolerance: float = TOLERANCE, modes: int | None = None) -> Simulation:
+        """Simulation of the solid, on all threads; of as many modes as targets if None."""
+        modes = modes or len(self.objective.targets.frequencies)
         return Simulation(
             self.mesh, self.options, self.material, self.strikes, modes, tolerance, self.cells
         )
@@ -58,18 +57,14 @@ class Task:
 
     Attributes
     ----------
-    z : (m,)
-        Coordinates.
-    start : (3 n, k) or None
-        Rows of modes that the analysis starts from.
-    gradient : bool
-        Whether the gradient of the cost is computed.
+    z, start : (m,), (3 n, k) or None
+        Coordinates, and rows of modes that the analysis starts from.
+    gradient, fine
+        Whether the gradient of the cost is computed, and whether the fine solid is analysed.
     options, steps, damping, limits
         Parameters of a descent, see `descend`; without options the task is a single evaluation.
     objective
         Objective instead of the setting's.
-    fine : bool
-        Whether the fine solid is analysed instead of that of the search.
     """
 
     z: Array
@@ -89,14 +84,10 @@ class Trial:
 
     Attributes
     ----------
-    z : (m,)
-        Coordinates of the material.
-    cost
-        Cost; `FAILED` if the modes were not found.
-    evaluations : int
-        Number of evaluations.
-    gradient : (m,) or None
-        Gradient of the cost, if it was computed.
+    z, gradient : (m,), (m,) or None
+        Coordinates of the material, and the gradient of the cost if it was computed.
+    cost, evaluations
+        Cost, `FAILED` if the modes were not found, and number of evaluations.
     descent
         Record of a descent, without its modes.
     start : (3 n, k) or None
@@ -116,18 +107,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class SearchStep:
-    """A step of a descent, reported while the descent goes on.
-
-    Attributes
-    ----------
-    z : (m,)
-        Coordinates.
-    cost
-        Cost by the objective of the descent.
-    eigenvalues : (N,) [rad^2/s^2]
-        Eigenvalues of the elastic modes.
-    fine : bool
-        Whether the fine solid was analysed.
+    """A step of a descent, reported while the descent goes on: coordinates z (m,), cost by the
+    objective of the descent, eigenvalues (N,) [rad^2/s^2] of the elastic modes, whether on the fine
+    solid.
     """
 
     z: Array

@@ -30,17 +30,16 @@ EMBEDDING = "vertex value = sum over nodes c of weights[v, c] * values[{}[cell[v
 def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any]) -> None:
     """Write a modes file of the solver that holds surface, embedding, dampings and targets, too.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
+    Raises UserError if the file cannot be written.
     """
     residuals = recomputed_residuals(*assembled(design.model), design.eigenvalues, design.modes)
+    # The dataset that holds the nodes of the elements that the surface lies in.
+    nodes = "cells" if isinstance(design.model, ElasticModel) else f"{FINITE_CELLS}/nodes"
     attributes = {
         "method": "sound design",
         "normalisation": NORMALISATION,
         "sound": SOUND,
-        "embedding": EMBEDDING.format(_elements(design)),
+        "embedding": EMBEDDING.format(nodes),
         "mesh": str(design.settings.get("mesh", "")),
     }
 
@@ -57,11 +56,6 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
         parameters,
         more,
     )
-
-
-def _elements(design: Design) -> str:
-    """Dataset that holds the nodes of the elements that the surface lies in."""
-    return "cells" if isinstance(design.model, ElasticModel) else f"{FINITE_CELLS}/nodes"
 
 
 def _put_more(file: h5py.File, design: Design) -> None:

@@ -78,10 +78,7 @@ process = force(gate, contact) * impulse : model(position);
 def write_faust(path: str | Path, design: Design, points: int) -> None:
     """Write a `.dsp` with the targets' struck points and `points` others all over the surface.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
+    Raises UserError if the file cannot be written.
     """
     text = faust_program(design, points, Path(path).stem)
     with atomic_path(path) as temporary:
@@ -136,7 +133,6 @@ def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array
 
 
 def _plain(name: str) -> str:
-    """A name without characters that have a meaning in a Faust label."""
     return re.sub(r"[^\w .+-]", "_", name)
 
 

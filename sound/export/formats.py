@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from carillon.errors import UserError
+from carillon.files.atomic import atomic_path
 
 if TYPE_CHECKING:
     from sound.project.design import Design
@@ -16,10 +17,7 @@ FORMATS = ("h5", "gltf", "glb", "dsp", "npy")
 def format_of(out: str, named: str | None = None) -> str:
     """The format of a file, as named or as its ending says.
 
-    Raises
-    ------
-    UserError
-        If the two contradict each other, or neither tells one.
+    Raises UserError if the two contradict each other, or neither tells one.
     """
     ending = Path(out).suffix.lstrip(".").lower()
     if named is not None and ending in FORMATS and ending != named:
@@ -37,19 +35,10 @@ def format_of(out: str, named: str | None = None) -> str:
 def export_design(
     path: str | Path, design: Design, kind: str, points: int = 0, source: str | None = None
 ) -> None:
-    """Write a design in one of `FORMATS`.
+    """Write a design, read from the file `source`, in one of `FORMATS`.
 
-    Parameters
-    ----------
-    points
-        Struck points of a Faust program, besides the targets'.
-    source
-        File that the design was read from, for the provenance.
-
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
+    A Faust program has so many struck points besides the targets'.  Raises UserError if the file
+    cannot be written.
     """
     match kind:
         case "h5":
@@ -61,9 +50,10 @@ def export_design(
 
             write_faust(path, design, points)
         case "npy":
-            from sound.export.moduli import write_moduli
+            from numpy import save
 
-            write_moduli(path, design)
+            with atomic_path(path) as temporary, open(temporary, "wb") as file:
+                save(file, design.young)
         case _:
             from sound.export.gltf import write_gltf
 

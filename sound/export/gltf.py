@@ -14,6 +14,9 @@ asks for such data "in the same form", and the factors stand in the model's extr
 
 from __future__ import annotations
 
+import base64
+import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +25,7 @@ from numpy.typing import NDArray
 
 from carillon import __version__
 from carillon.fem.model import mass_properties
-from sound.export.gltf_buffer import (
-    FLOAT,
-    TRIANGLES,
-    UNSIGNED_INT,
-    VERTICES,
-    Buffer,
-    write_asset,
-)
+from carillon.files.atomic import atomic_path
 from sound.project.design import Design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
@@ -49,15 +45,87 @@ UNITS = {
     "youngsModulus": "Pa",
     "output": "full scale is 1",
 }
+FLOAT, UNSIGNED_INT = 5126, 5125
+VERTICES, TRIANGLES = 34962, 34963
+_ALIGNMENT = 4
+_WIDTHS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+_MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
+
+
+class Buffer:
+    """Data of accessors, one view each, aligned to four bytes as all of them are."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, values: NDArray[Any], component: int, target: int | None = None) -> int:
+        """Append values (n,), (n, 3) or (n, 4); returns the number of their accessor."""
+        rows = values.reshape(len(values), -1).astype("<f4" if component == FLOAT else "<u4")
+        self.accessors.append(
+            {
+                "bufferView": self.add_bytes(rows.tobytes(), target),
+                "componentType": component,
+                "count": len(rows),
+                "type": _WIDTHS[rows.shape[1]],
+                "min": rows.min(axis=0).tolist(),
+                "max": rows.max(axis=0).tolist(),
+            }
+        )
+        return len(self.accessors) - 1
+
+    def add_bytes(self, raw: bytes, target: int | None = None) -> int:
+        """Append bytes, such as a file; returns the number of their view."""
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(raw)}
+        self.views.append(view if target is None else {**view, "target": target})
+        self.data += raw + b"\0" * (-len(raw) % _ALIGNMENT)
+        return len(self.views) - 1
+
+    def entries(self) -> dict[str, Any]:
+        """Entries of a document that describe the buffer."""
+        return {
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": len(self.data)}],
+        }
+
+
+def write_asset(path: str | Path, document: dict[str, Any], data: bytes, binary: bool) -> None:
+    """Write `.glb` if `binary`, else `.gltf` with the data, the document's only buffer, embedded in
+    it.
+
+    Raises UserError if the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        if binary:
+            temporary.write_bytes(_glb(document, data))
+        else:
+            text = base64.b64encode(data).decode()
+            document["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{text}"
+            temporary.write_text(json.dumps(document))
+
+
+def _glb(document: dict[str, Any], data: bytes) -> bytes:
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % _ALIGNMENT)
+    data += b"\0" * (-len(data) % _ALIGNMENT)
+    length = 12 + 8 + len(text) + 8 + len(data)
+    return b"".join(
+        [
+            struct.pack("<III", _MAGIC, 2, length),
+            struct.pack("<II", len(text), _JSON),
+            text,
+            struct.pack("<II", len(data), _BIN),
+            data,
+        ]
+    )
 
 
 def write_gltf(path: str | Path, design: Design, binary: bool) -> None:
     """Write `.glb` if `binary`, else `.gltf` with the data embedded in it.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
+    Raises UserError if the file cannot be written.
     """
     write_asset(path, *gltf_document(design), binary)
 
@@ -122,7 +190,6 @@ def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
 def _loudest_first(
     design: Design, solid: SoundingSolid, listening: Listening
 ) -> NDArray[np.integer]:
-    """Order of the modes by their energy when the targets' points are struck."""
     inward = np.array([strike.inward for strike in design.strikes])
     amplitudes = solid.amplitudes(listening.positions, inward) * listening.gains[:, None]
     return np.argsort(-(amplitudes**2).sum(axis=0) / solid.dampings, kind="stable")
@@ -155,7 +222,6 @@ def _material(design: Design) -> dict[str, Any]:
 
 
 def _strike_nodes(design: Design, listening: Listening) -> list[dict[str, Any]]:
-    """Empty nodes where the targets were assigned."""
     return [
         {
             "name": strike.name,

@@ -18,7 +18,7 @@ import numpy as np
 
 from carillon import __version__
 from carillon.arrays import Array
-from sound.export.gltf_buffer import (
+from sound.export.gltf import (
     FLOAT,
     TRIANGLES,
     UNSIGNED_INT,
@@ -26,8 +26,7 @@ from sound.export.gltf_buffer import (
     Buffer,
     write_asset,
 )
-from sound.scenes.performance import Performance
-from sound.scenes.picture import Appearance, Camera, Motion, Picture, linear_light
+from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture, linear_light
 
 EXTENSION = "KHR_audio_emitter"
 DRAFT = (
@@ -49,10 +48,7 @@ _STRAIGHT = 1e-9
 def write_scene_gltf(path: str | Path, performance: Performance, binary: bool) -> None:
     """Write `.glb` if `binary`, else `.gltf` with the data embedded in it.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
+    Raises UserError if the file cannot be written.
     """
     write_asset(path, *scene_document(performance), binary)
 
@@ -70,6 +66,8 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
         "children": list(range(1, 1 + len(nodes))),
     }
     emitter = {EXTENSION: {"emitters": [0]}}
+    camera = picture.camera  # sees as far as to infinity
+    perspective = {"yfov": float(np.radians(camera.degrees)), "znear": NEAREST * _distance(camera)}
     document = {
         "asset": {
             "version": "2.0",
@@ -83,7 +81,7 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
         "nodes": [root, *nodes],
         "meshes": [_mesh(each, number, buffer) for number, each in enumerate(seen)],
         "materials": [_material(each) for each in seen],
-        "cameras": [_camera(picture.camera)],
+        "cameras": [{"type": "perspective", "perspective": perspective}],
         "animations": [{"name": "motion", "channels": channels, "samplers": samplers}],
         **buffer.entries(),
     }
@@ -91,7 +89,6 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
 
 
 def _object_nodes(picture: Picture) -> list[dict[str, Any]]:
-    """A node for each object, at its first position; its mesh has the object's number."""
     turns = _turns(picture.motion)
     return [
         {
@@ -105,7 +102,6 @@ def _object_nodes(picture: Picture) -> list[dict[str, Any]]:
 
 
 def _animation(motion: Motion, buffer: Buffer) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Channels and samplers: positions and rotations of each object, at shared times."""
     channels: list[dict[str, Any]] = []
     samplers: list[dict[str, Any]] = []
     times = buffer.add(motion.times, FLOAT)
@@ -150,7 +146,6 @@ def _material(each: Appearance) -> dict[str, Any]:
 
 
 def _ground(picture: Picture) -> list[Appearance]:
-    """A square around the camera's target, if there is a ground."""
     if picture.ground is None:
         return []
     reach = GROUND_REACH * _distance(picture.camera)
@@ -165,15 +160,6 @@ def _ground_nodes(picture: Picture) -> list[dict[str, Any]]:
         return []
     height = [0.0, 0.0, picture.ground]
     return [{"name": "ground", "mesh": len(picture.objects), "translation": height}]
-
-
-def _camera(camera: Camera) -> dict[str, Any]:
-    """As far as it sees: to infinity."""
-    perspective = {
-        "yfov": float(np.radians(camera.degrees)),
-        "znear": NEAREST * _distance(camera),
-    }
-    return {"type": "perspective", "perspective": perspective}
 
 
 def _camera_node(camera: Camera) -> dict[str, Any]:
@@ -195,7 +181,6 @@ def _camera_node(camera: Camera) -> dict[str, Any]:
 
 
 def _distance(camera: Camera) -> float:
-    """Distance [m] from the camera to its target."""
     return float(np.linalg.norm(np.subtract(camera.position, camera.target)))
 
 

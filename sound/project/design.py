@@ -15,7 +15,6 @@ from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
-from sound.project.material_damping import MaterialDamping
 from sound.strikes import Strike
 
 HISTORY = {
@@ -32,18 +31,26 @@ HISTORY_TYPE = np.dtype([(name, float) for name in HISTORY])
 
 @dataclass(frozen=True)
 class FineFrequencies:
-    """Frequencies of the fine solid of a design.
-
-    Attributes
-    ----------
-    hertz : (N,) [Hz]
-        Frequencies of the elastic modes, ascending.
-    order : (N,)
-        Numbers of the coarse elastic modes of the same shapes.
+    """Frequencies (N,) [Hz] of the elastic modes of a design's fine solid, ascending, and in
+    `order` (N,) the numbers of the coarse elastic modes of the same shapes.
     """
 
     hertz: Array
     order: Integers
+
+
+@dataclass(frozen=True)
+class MaterialDamping:
+    """Dampings by loss factors of the material.
+
+    `loss_factors` (M,) are those of the fine cells, `mass_per_second` [1/s] the coefficient of mass
+    damping, as by air, half of which is part of every damping.  `dampings` (N,) [1/s] are d of the
+    elastic modes, in the order of `Design.frequencies`.
+    """
+
+    loss_factors: Array
+    mass_per_second: float
+    dampings: Array
 
 
 @dataclass
@@ -52,10 +59,8 @@ class Design:
 
     Attributes
     ----------
-    strikes
-        T struck points.
-    targets
-        Modes that the points shall have.
+    strikes, targets
+        T struck points, and the modes that they shall have.
     coordinates : (m,)
         z of the reduced material Y = Phi z (§6), over a reference modulus.
     young : (M,) [Pa]
@@ -63,28 +68,17 @@ class Design:
         targets (least squares of cents).
     model
         Analysed solid with its moduli.
-    eigenvalues : (6 + N,) [rad^2/s^2]
-        Eigenvalues, ascending, those of the rigid motions first.
-    modes : (n_dofs, 6 + N) [kg^-1/2]
-        Mass-normalised modes of the model.
-    surface_vertices : (V, 3) [m]
-        Vertices of the surface.
-    surface_faces : (F, 3)
-        Triangles of the surface.
-    fine_grid : (M, 3)
-        Integer coordinates of the fine cells.
-    fine_origin : (3,) [m]
-        Position of grid coordinates 0.
-    fine_edge : float [m]
-        Edge of a fine cell.
+    eigenvalues, modes : (6 + N,) [rad^2/s^2], (n_dofs, 6 + N) [kg^-1/2]
+        Eigenvalues, ascending, those of the rigid motions first; mass-normalised modes.
+    surface_vertices, surface_faces : (V, 3) [m], (F, 3)
+        Vertices and triangles of the surface.
+    fine_grid, fine_origin, fine_edge : (M, 3), (3,) [m], float [m]
+        Integer coordinates of the fine cells, position of coordinates 0, edge of a cell.
     history
         Rows of `HISTORY_TYPE`, see `HISTORY`.
-    settings : dict
-        The project with all defaults.
-    evidence : dict
-        Method and quality of the result.
-    provenance : dict
-        Origin of the numbers; set on reading.
+    settings, evidence, provenance : dict
+        The project with all defaults; method and quality of the result; origin of the numbers,
+        set on reading.
     fine
         Frequencies of the fine solid; None if they were not computed.
     damping
@@ -149,10 +143,7 @@ class Design:
     def damped_by(self, source: str | None) -> Design:
         """The design with dampings of the `clips` or of the `material`; unchanged if None.
 
-        Raises
-        ------
-        UserError
-            If it has no loss factors of its material.
+        Raises UserError if it has no loss factors of its material.
         """
         if source is None:
             return self
@@ -171,7 +162,8 @@ def fault(design: Design) -> str:
         return said
     targets = design.targets
     T, N = len(targets.names), len(targets.frequencies)
-    kept = RIGID_MODES + N
+    kept, cells = RIGID_MODES + N, design.model.mesh.n_cells
+    points = (8,) if isinstance(design.model, ElasticModel) else ()
     expected: list[tuple[str, Any, tuple[int | None, ...]]] = [
         ("strikes", design.strikes, (T,)),
         ("dampings", targets.dampings, (N,)),
@@ -180,7 +172,7 @@ def fault(design: Design) -> str:
         ("rates", targets.rates, (T,)),
         ("eigenvalues", design.eigenvalues, (kept,)),
         ("modes", design.modes, (design.model.n_dofs, kept)),
-        ("moduli of the coarse cells", design.model.young, _shape_of_moduli(design.model)),
+        ("moduli of the coarse cells", design.model.young, (cells, *points)),
         ("coordinates", design.coordinates, (None,)),
         ("fine cells", design.fine_grid, (len(design.young), 3)),
         ("surface vertices", design.surface_vertices, (None, 3)),
@@ -227,7 +219,6 @@ SOURCES = ("clips", "material")
 
 
 def _fault_of_texts(design: Design) -> str:
-    """The first unusable value of settings and evidence, which are arbitrary JSON in a file."""
     texts: dict[str, Any] = {"settings": design.settings, "evidence": design.evidence}
     for name, value in texts.items():
         if not isinstance(value, Mapping):
@@ -249,11 +240,6 @@ def _fault_of_texts(design: Design) -> str:
 def _is_number(value: Any) -> bool:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return is_number and math.isfinite(value)
-
-
-def _shape_of_moduli(model: Solid) -> tuple[int, ...]:
-    points = (8,) if isinstance(model, ElasticModel) else ()
-    return (model.mesh.n_cells, *points)
 
 
 def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:

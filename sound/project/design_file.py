@@ -16,8 +16,14 @@ from carillon.records.measurement import measured
 from solver.files.model_group import get_model, put, put_model
 from solver.files.modes_file import put_eigenvalues, put_modes
 from sound.clips.targets import Targets
-from sound.project.design import HISTORY, HISTORY_TYPE, Design, FineFrequencies, fault
-from sound.project.material_damping import get_damping, put_damping
+from sound.project.design import (
+    HISTORY,
+    HISTORY_TYPE,
+    Design,
+    FineFrequencies,
+    MaterialDamping,
+    fault,
+)
 from sound.strikes import Strike
 
 KIND = "design"
@@ -27,12 +33,8 @@ SCHEMA = 1
 def write_design(path: str | Path, design: Design) -> None:
     """Write a design atomically.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
-    ValueError
-        If the design's parts do not fit each other.
+    Raises UserError if the file cannot be written, and ValueError if its parts do not fit each
+    other.
     """
     wrong = fault(design)
     if wrong:
@@ -64,18 +66,16 @@ def put_object(file: h5py.File, design: Design) -> None:
         put(file, "fine/frequencies", design.fine.hertz, "Hz", "elastic modes of the fine solid")
         put(file, "fine/order", design.fine.order, "1", "coarse elastic mode of the same shape")
     if design.damping is not None:
-        put_damping(file["fine"], design.damping)
+        _put_damping(file["fine"], design.damping)
 
 
 def read_design(path: str | Path) -> Design:
     """Read a design.
 
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another kind or schema, or inconsistent.
+    Raises UserError if the file is missing, damaged, of another kind or schema, or inconsistent.
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        fine = file["fine"]
         columns = [file[f"history/{name}"][()] for name in HISTORY]
         design = Design(
             _get_strikes(file["strikes"]),
@@ -94,8 +94,10 @@ def read_design(path: str | Path) -> Design:
             json.loads(file["settings"].asstr()[()]),
             json.loads(file["evidence"].asstr()[()]),
             provenance.read(file),
-            _get_fine(file["fine"]),
-            get_damping(file["fine"]),
+            FineFrequencies(fine["frequencies"][()], fine["order"][()])
+            if "frequencies" in fine
+            else None,
+            _get_damping(fine),
         )
     wrong = fault(design)
     if wrong:
@@ -103,11 +105,18 @@ def read_design(path: str | Path) -> Design:
     return design
 
 
-def _get_fine(group: h5py.Group) -> FineFrequencies | None:
-    """Frequencies of the fine solid, if the design has them."""
-    if "frequencies" not in group:
+def _put_damping(group: h5py.Group, damping: MaterialDamping) -> None:
+    put(group, "loss_factors", damping.loss_factors, "1", "loss factor of the fine cells")
+    mass = np.array([damping.mass_per_second])
+    put(group, "mass_per_second", mass, "1/s", "twice the damping that all modes have in common")
+    put(group, "dampings", damping.dampings, "1/s", "of the elastic modes, by these two")
+
+
+def _get_damping(group: h5py.Group) -> MaterialDamping | None:
+    if "loss_factors" not in group:
         return None
-    return FineFrequencies(group["frequencies"][()], group["order"][()])
+    mass = float(group["mass_per_second"][0])
+    return MaterialDamping(group["loss_factors"][()], mass, group["dampings"][()])
 
 
 def _put_strikes(group: h5py.Group, strikes: Sequence[Strike]) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
+from carillon.arrays import Surface
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.model import DEFAULT_DENSITY
 from carillon.parameters import REQUIRED, OneOf, Within, option, parameters
 from carillon.parameters.documents import document_of, parameters_from, read_parameters
+from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import (
     Components,
     Density,
@@ -34,24 +36,7 @@ from sound.project.settings import (
     TargetEntry,
     Weights,
 )
-from sound.strikes import Place, Strike, locate_all
-from sound.surface import struck_surface
-
-if TYPE_CHECKING:
-    import trimesh
-
-_SOLID = (
-    "mesh",
-    "resolution",
-    "unit",
-    "fill",
-    "components",
-    "poisson",
-    "density",
-    "coarsen",
-    "forest",
-    "discretisation",
-)
+from sound.strikes import Place, Strike, locate_all, struck_surface
 
 
 @parameters
@@ -116,30 +101,23 @@ class Project:
 
     @property
     def solid(self) -> ProblemOptions:
-        """The solid to analyse."""
-        return ProblemOptions(**{key: getattr(self, key) for key in _SOLID})
+        """The solid to analyse, by the keys that both have but the material."""
+        shared = (parameters_of(ProblemOptions).keys() & parameters_of(Project)) - {"material"}
+        return ProblemOptions(**{key: getattr(self, key) for key in shared})
 
     def as_dict(self) -> dict[str, Any]:
         """The project as its file has it, with all defaults and its paths as they are here."""
         return document_of(self)
 
-    def surface(self) -> trimesh.Trimesh:
-        """Surface that is struck, in metres.
-
-        Raises
-        ------
-        UserError
-            If there is no such mesh.
-        """
+    def surface(self) -> Surface:
+        """Surface that is struck, in metres; raises UserError if there is no such mesh."""
         return struck_surface(self.solid.mesh, self.solid.unit)
 
-    def strikes(self, surface: trimesh.Trimesh) -> list[Strike]:
+    def strikes(self, surface: Surface) -> list[Strike]:
         """The targets' points on `surface`, which `Project.surface` made.
 
-        Raises
-        ------
-        UserError
-            If one is far from the surface, or two are at one place; see `sound.strikes`.
+        Raises UserError if one is far from the surface, or two are at one place; see
+        `sound.strikes`.
         """
         places = [Place(target.name, target.at, target.vertex) for target in self.targets]
         return locate_all(surface, places, self.solid.unit)
@@ -148,10 +126,7 @@ class Project:
 def load_project(path: str | Path) -> Project:
     """Read a project file (YAML), but none of the files that it names.
 
-    Raises
-    ------
-    UserError
-        With one sentence about the first thing that is wrong with it.
+    Raises UserError with one sentence about the first thing that is wrong with it.
     """
     return _in_folder(read_parameters(path, Project, "a project"), Path(path).parent)
 
@@ -159,10 +134,7 @@ def load_project(path: str | Path) -> Project:
 def project_of(described: Mapping[str, Any], folder: Path) -> Project:
     """The project that the keys and values of a file in `folder` describe.
 
-    Raises
-    ------
-    UserError
-        With one sentence about the first thing that is wrong.
+    Raises UserError with one sentence about the first thing that is wrong.
     """
     return _in_folder(parameters_from(described, Project), folder)
 
@@ -170,10 +142,7 @@ def project_of(described: Mapping[str, Any], folder: Path) -> Project:
 def with_optimiser(project: Project, **given: Any) -> Project:
     """The project with other settings of its optimiser; those that are None stay as they are.
 
-    Raises
-    ------
-    UserError
-        If one is beyond what projects may have.
+    Raises UserError if one is beyond what projects may have.
     """
     changes = {key: value for key, value in given.items() if value is not None}
     return replace(project, optimiser=replace(project.optimiser, **changes))

@@ -55,9 +55,7 @@ class TargetEntry:
     allow_clipped: bool = option(
         False, "whether the clip may be clipped; its samples at full scale are left out then"
     )
-    without: Annotated[
-        tuple[Annotated[float, Within(gt=0.0, le=1e6)], ...], Within(max_length=1000)
-    ] = option(
+    without: Annotated[tuple[Frequency, ...], Within(max_length=1000)] = option(
         (),
         "frequencies of modes of the clip that are left out, such as those of a room or a hand "
         "[Hz]",

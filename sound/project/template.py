@@ -14,14 +14,10 @@ _STEP = "  "
 
 
 def project_text(values: Mapping[str, Any]) -> str:
-    """A project (YAML) of given values.
+    """A project (YAML) of given keys and values; those of a section or of a list's entries are a
+    mapping.
 
     All other keys are there too, each with its default behind a #.
-
-    Parameters
-    ----------
-    values
-        Keys and values of a project; those of a section or of a list's entries as a mapping.
     """
     schema = schema_of(Project)
     lines = [f"# {schema['description']}", "# Keys behind a # have the value that stands there."]
@@ -70,7 +66,6 @@ def _meaning(part: Mapping[str, Any]) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A value on one line, as YAML."""
     width = float("inf")
     text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=width)
     return text.removesuffix("...\n").strip()

@@ -28,15 +28,9 @@ Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]
 class HeardSolid:
     """A solid with its loudness and its surface.
 
-    Attributes
-    ----------
-    solid
-        Modes.
-    listening
-        Loudness and noise of a design's clips; None for modes of no design.
-    places
-        Function from points of the surface, each with its name in messages, to positions (3,) [m],
-        inward normals (3,) and distances [m] from the points named.
+    `listening` has loudness and noise of a design's clips, and is None for modes of no design.
+    `places` leads from points of the surface, each with its name in messages, to positions (3,)
+    [m], inward normals (3,) and distances [m] from the points named.
     """
 
     solid: SoundingSolid
@@ -46,10 +40,7 @@ class HeardSolid:
     def hits(self, path: str | Path, strikes: Sequence[ListedStrike], strength: float) -> list[Hit]:
         """The strikes of a list, read from `path`; `strength` [N s] is that of lines without one.
 
-        Raises
-        ------
-        UserError
-            If a point cannot be struck, with the line.
+        Raises UserError if a point cannot be struck, with the line.
         """
         points = {strike.point: f"line {strike.line}" for strike in reversed(strikes)}
         try:
@@ -71,23 +62,12 @@ def open_heard_solid(
     damping: Sequence[float] | None = None,
     damping_from: str | None = None,
 ) -> HeardSolid:
-    """The solid of a file, as it is heard.
+    """The solid of a file, a design or modes of the solver, as it is heard.
 
-    Parameters
-    ----------
-    file
-        A design, or modes of the solver.
-    like
-        For modes of a designed object: the design.
-    damping : (2,) or None
-        For modes of no design: Rayleigh's coefficients of mass [1/s] and stiffness [s].
-    damping_from : str or None
-        Of a design: see `Design.damped_by`.
-
-    Raises
-    ------
-    UserError
-        If a file is unusable, or what is given does not go with its kind.
+    Modes of a designed object are heard `like` that design, other ones with Rayleigh's `damping`
+    coefficients of mass [1/s] and stiffness [s]; `Design.damped_by` has the sources that dampings
+    of a design come from.  Raises UserError if a file is unusable, or what is given does not go
+    with its kind.
     """
     has_modes = kind_of(file, "a Carillon design or modes file (HDF5)")[0] == "modes"
     if not has_modes and (damping or like):

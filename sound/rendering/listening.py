@@ -16,25 +16,16 @@ from sound.rendering.solid import SoundingSolid
 
 @dataclass(frozen=True)
 class Listening:
-    """Loudness and noise of a design's clips at the struck points.
+    """Loudness and noise of a design's clips at the struck points, at positions (T, 3) [m].
 
-    A clip counts as the sound of 1 N s along the inward normal.  The gain of its point makes the
-    loudest mode there as loud as the clip's, as Eq. 2 compares them.  Elsewhere gains and noise are
-    averages weighted by the inverse square of the distance.  Only the noise of a residual is heard:
-    partials that were missed belong to the clip, not to the material.
+    A clip counts as the sound of 1 N s along the inward normal.  The gain (T,) [kg^1/2 N^-1 s^-1]
+    of its point, samples of full scale per amplitude, makes the loudest mode there as loud as the
+    clip's, as Eq. 2 compares them.  Elsewhere gains and noise are averages weighted by the inverse
+    square of the distance.  Only the noise of a residual is heard: partials that were missed belong
+    to the clip, not to the material.
 
-    Attributes
-    ----------
-    positions : (T, 3) [m]
-        Struck points.
-    gains : (T,) [kg^1/2 N^-1 s^-1]
-        Samples of full scale per amplitude.
-    residuals : T arrays (s,)
-        The clips without their modes, after 1 N s.
-    rates : T integers [Hz]
-        Sampling rates of the residuals.
-    energies : (T,)
-        Energies of the clips' modes: squared samples summed over all time.
+    `residuals` are T arrays (s,) at `rates` [Hz], the clips without their modes, and `energies`
+    (T,) those of the clips' modes: squared samples summed over all time.
     """
 
     positions: Array

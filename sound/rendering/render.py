@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from carillon.arrays import Array
 from solver.response.response import SAMPLE_RATE_HERTZ, half_sine
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
-from sound.synthesis.bank import Bank, ring
+from sound.synthesis.sinusoids import Bank, ring
 
 DECAY_NEPERS = np.log(1e3)
 """Decay by 60 dB [nepers]."""
@@ -32,21 +33,9 @@ class Hit:
     distance: float = 0.0
 
 
-def render(
-    solid: SoundingSolid,
-    hits: Sequence[Hit],
-    seconds: float,
-    rate: int = SAMPLE_RATE_HERTZ,
-    contact_seconds: float = 0.0,
-    listening: Listening | None = None,
-    residual: bool = True,
-) -> Array:
-    """The sound (s,) of one strike or many; strikes superpose.
-
-    The sum of `rendered_parts`, which describes the parameters.
-    """
-    parts = rendered_parts(solid, hits, seconds, rate, contact_seconds, listening, residual)
-    return np.add(*parts)
+def render(*given: Any, **named: Any) -> Array:
+    """The sound (s,) of one strike or many: the sum of `rendered_parts`, with its parameters."""
+    return np.add(*rendered_parts(*given, **named))
 
 
 def rendered_parts(
@@ -62,14 +51,8 @@ def rendered_parts(
 
     Parameters
     ----------
-    solid
-        Modes.
-    hits
-        Strikes.
-    seconds : float [s]
-        Length.
-    rate : int [Hz]
-        Samples per second; modes from half of it on are left out.
+    seconds, rate : float [s], int [Hz]
+        Length, and samples per second; modes from half of these on are left out.
     contact_seconds : float [s]
         Duration of the force, half a sine; 0 is an impulse.  A longer force excites high modes
         less.  The noise, which is recorded, does not depend on it.
@@ -93,7 +76,12 @@ def rendered_parts(
         modes = fftconvolve(modes, half_sine(contact_seconds, rate))[:count]
     noise = np.zeros(count)
     if listening is not None and residual:
-        _add_noise(noise, hits, listening, rate)
+        noises = listening.noise(rate)
+        for hit in hits:
+            begin, strength = round(hit.seconds * rate), np.linalg.norm(hit.impulse)
+            for weight, own in zip(listening.weights(hit.position), noises):
+                part = own[: max(0, count - begin)] if weight > 0.0 else own[:0]
+                noise[begin : begin + len(part)] += weight * strength * part
     return modes, noise
 
 
@@ -107,12 +95,3 @@ def ringing_seconds(solid: SoundingSolid) -> float:
     """Time until the slowest mode has decayed by 60 dB, at most `LONGEST_SECONDS`."""
     slowest = float(solid.dampings.min())
     return min(LONGEST_SECONDS, DECAY_NEPERS / slowest) if slowest > 0.0 else LONGEST_SECONDS
-
-
-def _add_noise(sound: Array, hits: Sequence[Hit], listening: Listening, rate: int) -> None:
-    noises = listening.noise(rate)
-    for hit in hits:
-        begin, strength = round(hit.seconds * rate), np.linalg.norm(hit.impulse)
-        for weight, noise in zip(listening.weights(hit.position), noises):
-            part = noise[: max(0, len(sound) - begin)] if weight > 0.0 else noise[:0]
-            sound[begin : begin + len(part)] += weight * strength * part

@@ -21,16 +21,8 @@ from sound.project.design import Design
 class SoundingSolid:
     """Elastic modes of a solid.
 
-    Attributes
-    ----------
-    frequencies : (k,) [Hz]
-        Frequencies f of Eq. 3 of the appendix.
-    dampings : (k,) [1/s]
-        Dampings d of that equation.
-    model
-        Solid whose nodes the modes are given on.
-    modes : (n_dofs, k) [kg^-1/2]
-        Mass-normalised.
+    `frequencies` f (k,) [Hz] and `dampings` d (k,) [1/s] are those of Eq. 3 of the appendix.  The
+    mass-normalised `modes` (n_dofs, k) [kg^-1/2] are given on the nodes of `model`.
     """
 
     frequencies: Array
@@ -58,15 +50,8 @@ class SoundingSolid:
     ) -> SoundingSolid:
         """A solid with Rayleigh damping, without rigid modes and overdamped ones.
 
-        Parameters
-        ----------
-        eigenvalues, modes : (k,) [rad^2/s^2], (n_dofs, k) [kg^-1/2]
-            Ascending, those of the rigid motions first.
-
-        Raises
-        ------
-        UserError
-            If none is left.
+        Its eigenvalues (k,) [rad^2/s^2] and modes (n_dofs, k) [kg^-1/2] ascend, those of the rigid
+        motions first.  Raises UserError if none is left.
         """
         values = eigenvalues[RIGID_MODES:]
         decay = damping.decay_per_second(values)
@@ -85,10 +70,8 @@ class SoundingSolid:
         """A design's object by modes of a file, for instance of the fine mesh, damped as the
         design.
 
-        Raises
-        ------
-        UserError
-            If the file holds fewer elastic modes than the design, or those of another object.
+        Raises UserError if the file holds fewer elastic modes than the design, or those of another
+        object.
         """
         assert file.modes is not None
         count = len(design.frequencies)

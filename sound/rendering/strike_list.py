@@ -48,13 +48,9 @@ class ListedStrike(NamedTuple):
 def read_strikes(path: str | Path) -> list[ListedStrike]:
     """Read a list of strikes.
 
-    The first line names the columns, see `COLUMNS`.  Every other line has a time and one place.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, no table, too long or empty, or a line of it is wrong, which is
-        named by its number.
+    The first line names the columns, see `COLUMNS`. Every other line has a time and one place.
+    Raises UserError if the file is missing, no table, too long or empty, or a line of it is wrong,
+    which is named by its number.
     """
     text = _text(require_file(path, "a list of strikes (CSV)"))
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
@@ -129,9 +125,9 @@ def _point(row: Mapping[str, str]) -> Point:
     coordinates = [name for name in AT if name in row]
     given = [name for name in (TARGET, VERTEX) if name in row] + [", ".join(AT)] * bool(coordinates)
     if len(given) != 1:
-        found = " and ".join(given) or "nothing"
+        places = " and ".join(given) or "nothing"
         raise UserError(
-            f"expected one place, in {TARGET}, in {VERTEX} or in {', '.join(AT)}; found {found}"
+            f"expected one place, in {TARGET}, in {VERTEX} or in {', '.join(AT)}; found {places}"
         )
     if TARGET in row:
         return Point(target=row[TARGET])

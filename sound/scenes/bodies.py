@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Integers
 from carillon.errors import ConvergenceError, UserError
-from sound.scenes.body import Body
+from sound.rendering.listening import Listening
+from sound.rendering.solid import SoundingSolid
 from sound.scenes.convex import convex_parts, hull_of
 from sound.scenes.hertz import compliance
 from sound.scenes.object_solid import ObjectSolid, object_solid
 from sound.scenes.scene import ObjectEntry
-from sound.scenes.shape import Shape
 
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""
@@ -23,17 +25,149 @@ Y_UP = (".gltf", ".glb")
 """Endings of mesh files whose y points up.  In all other files z is taken to point up."""
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Rotation from axes whose y points up to axes whose z does (glTF 2.0, section 3.4)."""
+SHARPEST = 5e-4
+"""Least radius of curvature [m]: edges of things are rounded by use."""
+SMOOTHINGS = 2
+"""Number of times that the curvature at each vertex is averaged with its neighbours'."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A surface of vertices (V, 3) [m] and triangles (F, 3) in an object's own axes, from its
+    centre of mass.
+
+    At the vertices, `inward` (V, 3) are unit vectors into the solid, and `radii` (V,) [m] those of
+    curvature.
+    """
+
+    vertices: Array
+    faces: Integers
+    inward: Array
+    radii: Array
+
+    @classmethod
+    def of_surface(
+        cls, vertices: Array, faces: Integers, centre: Array, radius: float | None = None
+    ) -> Shape:
+        """The shape of a surface about a centre (3,) [m]; `radius` [m] is that of a ball."""
+        import trimesh
+
+        from solver.response.vertices import inward_normals
+
+        surface = trimesh.Trimesh(vertices, faces, process=False)
+        inward = inward_normals(surface, vertices)
+        if radius is not None:
+            radii = np.full(len(vertices), radius)
+        else:
+            radii = vertex_radii(vertices, faces, inward)
+        return cls(vertices - centre, faces, inward, radii)
+
+
+def vertex_radii(vertices: Array, faces: Integers, normals: Array) -> Array:
+    """Radii of curvature (V,) [m], from the angles between the normals of neighbouring vertices.
+
+    They lie between `SHARPEST` and half of the longest side, which stands for flat.
+    """
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    first, second = edges.T
+    long = np.maximum(np.linalg.norm(vertices[first] - vertices[second], axis=1), 1e-12)
+    turned = np.linalg.norm(normals[first] - normals[second], axis=1)
+    curvature = _mean_at(first, second, turned / long, turned / long, len(vertices))
+    for _ in range(SMOOTHINGS):
+        near = _mean_at(first, second, curvature[second], curvature[first], len(vertices))
+        curvature = 0.5 * (curvature + near)
+    widest = 0.5 * float(np.ptp(vertices, axis=0).max())
+    return np.clip(1.0 / np.maximum(curvature, 1e-12), min(SHARPEST, widest), widest)
+
+
+def _mean_at(
+    first: NDArray[np.integer],
+    second: NDArray[np.integer],
+    to_first: Array,
+    to_second: Array,
+    n: int,
+) -> Array:
+    """Mean (n,) at each vertex of the values that its edges have for their first or second end."""
+    ends = np.concatenate([first, second])
+    sums = np.bincount(ends, np.concatenate([to_first, to_second]), n)
+    return np.asarray(sums / np.maximum(np.bincount(ends, minlength=n), 1))
+
+
+@dataclass(frozen=True)
+class Body:
+    """An object of a scene.
+
+    Its own axes have their origin at the centre of mass; z points up before it is turned.
+
+    Attributes
+    ----------
+    entry, shape
+        The object's entry in the scene, and its surface.
+    mass, inertia : float [kg], (3, 3) [kg m^2]
+        Mass, and inertia about the centre of mass in the body's own axes.
+    centre : (3,) [m]
+        Centre of mass, in the coordinates of the solid.
+    compliance : (V,) [1/Pa]
+        Compliance of the material at the surface's vertices, see `sound.scenes.hertz.compliance`.
+    parts : list of (n, 3) [m]
+        Corners of the convex parts that collide, in the body's own axes; none for a ball.
+    solid, listening
+        Modes, None if the body is silent; loudness and noise of a design's clips, None without.
+    radius : float [m] or None
+        Radius of a ball, None for any other body.
+    turn : (3, 3) or None
+        Rotation from the coordinates of the solid to the body's own axes; None if they agree.
+    accuracy : dict or None
+        Expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`, if known.
+    """
+
+    entry: ObjectEntry
+    mass: float
+    inertia: Array
+    centre: Array
+    shape: Shape
+    compliance: Array
+    parts: list[Array]
+    solid: SoundingSolid | None
+    listening: Listening | None
+    radius: float | None
+    turn: Array | None
+    accuracy: dict[str, Any] | None
+
+    @property
+    def volume(self) -> float:
+        """Volume of the material [m^3]."""
+        silent = self.entry.made_of.density
+        return self.mass / (silent if self.solid is None else self.solid.model.density)
+
+    def motion(self, places: Array) -> Array:
+        """Displacement (p, 3, k) [kg^-1/2] in each mode at places (p, 3) [m], in own axes."""
+        assert self.solid is not None
+        moved = self.solid.motion(self.in_solid(places))
+        return moved if self.turn is None else np.einsum("ij,pjk->pik", self.turn, moved)
+
+    def in_solid(self, places: Array) -> Array:
+        """Coordinates (p, 3) [m] in the solid of places (p, 3) [m] in the body's own axes."""
+        return self.along_solid(places) + self.centre
+
+    def along_solid(self, vectors: Array) -> Array:
+        """Components (p, 3) in the solid's axes of vectors (p, 3) in the body's own axes."""
+        return vectors if self.turn is None else vectors @ self.turn
+
+    def gains(self, places: Array) -> Array:
+        """Loudness (p, 1) of strikes at places (p, 3) [m] by a design's clips; 1 without a design.
+
+        The unit is that of `sound.rendering.listening.Listening.gain`.
+        """
+        if self.listening is None:
+            return np.ones((len(places), 1))
+        return np.array([[self.listening.gain(place)] for place in self.in_solid(places)])
 
 
 def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
     """The bodies of all objects; objects that differ in name and motion alone share their modes.
 
-    Raises
-    ------
-    UserError
-        See `body_of`.
-    ConvergenceError
-        See `body_of`.
+    Raises the errors of `body_of`.
     """
     origin = (0.0, 0.0, 0.0)
     made: dict[ObjectEntry, Body] = {}
@@ -51,12 +185,8 @@ def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
 def body_of(entry: ObjectEntry) -> Body:
     """The body of an object.
 
-    Raises
-    ------
-    UserError
-        If a file is missing or unusable, or a solid has no mass or no modes; names the object.
-    ConvergenceError
-        If the modes were not found; names the object.
+    Raises UserError if a file is missing or unusable, or a solid has no mass or no modes, and
+    ConvergenceError if the modes were not found; both name the object.
     """
     try:
         body = _upright_body(entry, object_solid(entry))

@@ -16,12 +16,10 @@ from importlib import metadata
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Integers, Surface
 from carillon.errors import UserError
 from carillon.files.cache import remembered
 from carillon.files.datasets import INTEGER, read, refused
@@ -42,11 +40,6 @@ from sound.scenes.cuttable import (
 )
 from sound.scenes.packages import REQUIREMENTS
 
-if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
-    import trimesh
-
-Faces = NDArray[np.integer]
-
 MOST_VERTICES = 64
 """Greatest number of vertices of a hull; more slow the engine down."""
 SEARCH = {
@@ -65,34 +58,17 @@ _DIRECTIONS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if wa
 
 
 def convex_parts(
-    vertices: Array, faces: Faces, concavity: float = 0.05, seed: int = 0
+    vertices: Array, faces: Integers, concavity: float = 0.05, seed: int = 0
 ) -> list[Array]:
-    """Convex hulls that together fill a solid.
+    """Vertices (n, 3) [m] of convex hulls that together fill a solid; a convex one has one hull.
 
     Closed components of the surface are cut one by one.  If a component is open, the solid is the
-    inside by winding numbers on a grid, see `GRIDS`.  Parts are kept in the user's cache.
+    inside by winding numbers on a grid, see `GRIDS`.  Parts are kept in the user's cache.  Hulls
+    have at most `MOST_VERTICES` and reach beyond the solid by about `concavity`, over half its
+    longest side; CoACD's search has a seed.
 
-    Parameters
-    ----------
-    vertices : (V, 3) [m]
-        Vertices of the surface.
-    faces : (F, 3)
-        Triangles.
-    concavity : float [1]
-        Approximate distance of hulls beyond the solid, over half its longest side.
-    seed : int
-        Seed of CoACD's search.
-
-    Returns
-    -------
-    hulls : list of (n, 3) [m]
-        Vertices of each hull, at most `MOST_VERTICES`; a convex solid has one hull.
-
-    Raises
-    ------
-    UserError
-        If the surface encloses nothing, `concavity` is out of bounds, CoACD is not installed, or
-        it fails.
+    Raises UserError if the surface encloses nothing, `concavity` is out of bounds, CoACD is not
+    installed, or it fails.
     """
     import trimesh
 
@@ -107,8 +83,7 @@ def convex_parts(
     )
 
 
-def _cut(solids: Sequence[trimesh.Trimesh], concavity: float, seed: int) -> list[Array]:
-    """Hulls of convex solids, and of the parts of the others."""
+def _cut(solids: Sequence[Surface], concavity: float, seed: int) -> list[Array]:
     from scipy.spatial import QhullError
 
     whole = [solid.vertices for solid in solids if is_convex(solid)]
@@ -182,14 +157,8 @@ def _search(task: str, result: str) -> None:
     np.savez(result, *parts)
 
 
-def _key(vertices: Array, faces: Faces, concavity: float, seed: int) -> str:
-    """Hash of all that the parts depend on.
-
-    Raises
-    ------
-    UserError
-        If CoACD is not installed.
-    """
+def _key(vertices: Array, faces: Integers, concavity: float, seed: int) -> str:
+    """Hash of all that the parts depend on; raises UserError if CoACD is not installed."""
     try:
         version = metadata.version("coacd")
     except metadata.PackageNotFoundError:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Integers, Surface
 from carillon.errors import UserError
-
-if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
-    import trimesh
-
-Faces = NDArray[np.integer]
 
 HOLLOW = 0.02
 """Greatest share of its hull that a convex solid leaves empty."""
@@ -34,22 +29,18 @@ EDGES_AT_ONCE = 256
 
 
 class Cuttable(NamedTuple):
-    """A closed surface, and CoACD's preprocessing of it.
+    """A closed surface of a solid, and CoACD's preprocessing of it: "off", or "auto" for one that
+    may cross itself.
 
-    Attributes
-    ----------
-    surface
-        Surface of a solid.
-    preprocessing
-        "off", or "auto" for a surface that may cross itself: CoACD then remeshes crossings and
-        narrow gaps, into a thicker surface that takes far longer to cut.
+    CoACD then remeshes crossings and narrow gaps, into a thicker surface that takes far longer to
+    cut.
     """
 
-    surface: trimesh.Trimesh
+    surface: Surface
     preprocessing: str
 
 
-def components(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+def components(surface: Surface) -> list[Surface]:
     """Closed surfaces of a solid: its pieces, or the whole if it has cavities.
 
     Pieces that touch but share no vertices, as boards of a box, are separate.  The list is empty if
@@ -67,28 +58,25 @@ def components(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     return [merged] if _is_solid(merged) else []
 
 
-def _is_solid(surface: trimesh.Trimesh) -> bool:
+def _is_solid(surface: Surface) -> bool:
     closed = surface.is_watertight and surface.is_winding_consistent
     return bool(closed and _volume(surface) > 0.0)
 
 
-def _volume(surface: trimesh.Trimesh) -> float:
+def _volume(surface: Surface) -> float:
     """Volume [m^3], negative if the surface is inside out; without warnings if it is flat."""
     return float(np.linalg.det(surface.triangles).sum()) / 6.0
 
 
-def is_convex(solid: trimesh.Trimesh) -> bool:
+def is_convex(solid: Surface) -> bool:
     """Whether a closed surface leaves at most the share `HOLLOW` of its hull empty."""
     return bool(_volume(solid) >= (1.0 - HOLLOW) * solid.convex_hull.volume)
 
 
-def remeshed(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+def remeshed(surface: Surface) -> list[Surface]:
     """Closed surfaces around the inside of one that is open, inside out or crosses itself.
 
-    Raises
-    ------
-    UserError
-        If the inside is empty.
+    Raises UserError if the inside is empty.
     """
     for grid in GRIDS if surface.area > 0.0 else ():
         solids = components(_boundary(surface, *grid))
@@ -100,7 +88,7 @@ def remeshed(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
     )
 
 
-def _boundary(surface: trimesh.Trimesh, cells: int, within: float) -> trimesh.Trimesh:
+def _boundary(surface: Surface, cells: int, within: float) -> Surface:
     """The closed surface between the inner and the outer points of a grid."""
     import igl
     import trimesh
@@ -115,7 +103,7 @@ def _boundary(surface: trimesh.Trimesh, cells: int, within: float) -> trimesh.Tr
     return trimesh.Trimesh(*igl.marching_cubes(distances, points, *map(int, counts), 0.0)[:2])
 
 
-def _distances(surface: trimesh.Trimesh, points: Array) -> Array:
+def _distances(surface: Surface, points: Array) -> Array:
     """Distances (p,) of points (p, 3) from a surface, negative within it."""
     import igl
 
@@ -126,7 +114,7 @@ def _distances(surface: trimesh.Trimesh, points: Array) -> Array:
     return np.asarray(igl.signed_distance(points, vertices, faces, sign)[0])
 
 
-def coarser(solid: trimesh.Trimesh) -> Cuttable:
+def coarser(solid: Surface) -> Cuttable:
     """A coarser solid that does not cross itself, or else the solid as it is."""
     for faces in MOST_FACES:
         if len(solid.faces) <= faces:
@@ -137,7 +125,7 @@ def coarser(solid: trimesh.Trimesh) -> Cuttable:
     return Cuttable(solid, "auto")
 
 
-def _decimated(solid: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
+def _decimated(solid: Surface, faces: int) -> Surface:
     """A coarser surface by edge collapses (Garland and Heckbert 1997)."""
     import igl
     import trimesh
@@ -148,7 +136,7 @@ def _decimated(solid: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     return trimesh.Trimesh(*igl.qslim(vertices, given, faces, block_intersections=True)[:2])
 
 
-def crosses_itself(surface: trimesh.Trimesh) -> bool:
+def crosses_itself(surface: Surface) -> bool:
     """Whether an edge intersects a triangle that it does not touch."""
     parts = max(1, len(surface.edges_unique) // EDGES_AT_ONCE)
     return any(
@@ -156,7 +144,7 @@ def crosses_itself(surface: trimesh.Trimesh) -> bool:
     )
 
 
-def _cross(surface: trimesh.Trimesh, edges: Faces) -> NDArray[np.bool_]:
+def _cross(surface: Surface, edges: Integers) -> NDArray[np.bool_]:
     """Which of the edges (e, 2) and triangles on whose two sides their ends lie intersect."""
     first, along, across = np.moveaxis(surface.triangles, 1, 0)
     along, across = along - first, across - first

@@ -22,14 +22,8 @@ def compliance(young: Array | float, poisson: float) -> Array:
 
 
 def bounce_seconds(mass: float, radius: float, modulus: float, speed: float) -> float:
-    """Duration [s] of the contact in an impact.
-
-    Parameters
-    ----------
-    mass, radius, modulus : float [kg], [m], [Pa]
-        Effective mass, radius and modulus.
-    speed : float [m/s]
-        Speed of approach.
+    """Duration [s] of the contact in an impact, by the effective mass [kg], radius [m] and modulus
+    [Pa], and the speed of approach [m/s].
 
     Examples
     --------

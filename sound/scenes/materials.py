@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,46 +12,25 @@ from carillon.errors import UserError
 from carillon.files.yaml_input import read_own_yaml
 from solver.response.response import Damping
 
-_NUMBERS = (
-    "young",
-    "poisson",
-    "density",
-    "alpha",
-    "beta",
-    "restitution",
-    "friction",
-    "roughness",
-)
-
 
 @dataclass(frozen=True)
 class NamedMaterial:
-    """A homogeneous, isotropic material.
+    """A homogeneous, isotropic material by its name in scenes.
 
     Attributes
     ----------
-    name
-        Name in scenes.
-    about
-        Description, with what is simplified.
-    young : float [Pa]
-        Young's modulus.
-    poisson : float [1]
-        Poisson's ratio.
-    density : float [kg/m^3]
-        Mass density.
+    about, source
+        Description, with what is simplified; source of the numbers.
+    young, poisson, density : float [Pa], [1], [kg/m^3]
+        Young's modulus, Poisson's ratio, mass density.
     alpha, beta : float [1/s], [s]
         Rayleigh damping: the damping matrix is alpha M + beta K.
     restitution : float [1]
         Speed after over speed before an impact at about 1 m/s on a hard, heavy body.
-    friction : float [1]
-        Coulomb's coefficient of sliding friction.
-    roughness : float [m]
-        Root mean square height of the surface.
+    friction, roughness : float [1], [m]
+        Coulomb's coefficient of sliding friction; root mean square height of the surface.
     colour : (3,)
         Red, green and blue from 0 to 1 (sRGB).
-    source
-        Source of the numbers.
     """
 
     name: str
@@ -73,25 +51,9 @@ class NamedMaterial:
         """Its Rayleigh damping, as the solver takes it."""
         return Damping(mass_per_second=self.alpha, stiffness_seconds=self.beta)
 
-    def loss_factor(self, frequency: float) -> float:
-        """Loss factor [1] of its Rayleigh damping at a frequency [Hz].
-
-        Examples
-        --------
-        >>> round(named_material("stone").loss_factor(1000.0), 4)
-        0.0067
-        """
-        turns = 2.0 * math.pi * frequency
-        return self.alpha / turns + self.beta * turns
-
 
 def named_material(name: str) -> NamedMaterial:
-    """The material of that name.
-
-    Raises
-    ------
-    UserError
-        If there is none.
+    """The material of that name; raises UserError if there is none.
 
     Examples
     --------
@@ -105,24 +67,16 @@ def named_material(name: str) -> NamedMaterial:
     return _TABLE[name]
 
 
-def _read(path: Path) -> dict[str, NamedMaterial]:
-    table: dict[str, dict[str, Any]] = read_own_yaml(path)
-    return {name: _material(name, values) for name, values in table.items()}
-
-
 def _material(name: str, values: Mapping[str, Any]) -> NamedMaterial:
     """A material from its entry, whose numbers may be integers."""
-    red, green, blue = map(float, values["colour"])
-    numbers: dict[str, Any] = {key: float(values[key]) for key in _NUMBERS}
-    return NamedMaterial(
-        name=name,
-        about=values["about"],
-        colour=(red, green, blue),
-        source=values["source"],
-        **numbers,
-    )
+    texts = {key: values[key] for key in ("about", "source")}
+    colour = tuple(map(float, values["colour"]))
+    numbers = {key: float(value) for key, value in values.items() if key not in (*texts, "colour")}
+    made: dict[str, Any] = {**texts, **numbers, "colour": colour}
+    return NamedMaterial(name, **made)
 
 
-_TABLE = _read(Path(__file__).parent / "materials.yaml")
+_ENTRIES: Mapping[str, Any] = read_own_yaml(Path(__file__).parent / "materials.yaml")
+_TABLE = {name: _material(name, values) for name, values in _ENTRIES.items()}
 MATERIALS = tuple(_TABLE)
 """Names of all materials."""

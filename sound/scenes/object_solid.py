@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Surface
 from carillon.errors import UserError
 from carillon.fem.geometry.size import doubt_unit
 from carillon.fem.model import MassProperties, Solid, mass_properties
@@ -23,10 +23,6 @@ from sound.rendering.solid import SoundingSolid
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.uniform import Discretised, UniformSolid, uniform_solid
 
-if TYPE_CHECKING:  # Its import takes long, and a scene may have no solid of a mesh.
-    import trimesh
-
-
 BALL_DIVISIONS = 3
 """Number of times that the faces of an icosahedron are divided to make the surface of a ball."""
 
@@ -39,16 +35,12 @@ class ObjectSolid:
     ----------
     rigid
         Mass, centre of mass and inertia.
-    vertices, faces : (V, 3) [m], (F, 3)
-        Surface.
-    young, poisson : (V,) [Pa], float
-        Young's modulus at the vertices, and Poisson's ratio.
-    sounding
-        Modes; None if the object is silent.
+    vertices, faces, young, poisson : (V, 3) [m], (F, 3), (V,) [Pa], float
+        Surface, Young's modulus at its vertices, and Poisson's ratio.
+    sounding, listening
+        Modes, None if the object is silent; loudness and noise of a design's clips, None without.
     mesh : str
         Name of the mesh file that the solid was made from, empty if there is none.
-    listening
-        Loudness and noise of a design's clips; None for a solid of no design.
     radius : float [m] or None
         Radius of a ball, None for any other solid.
     accuracy : dict or None
@@ -70,12 +62,8 @@ class ObjectSolid:
 def object_solid(entry: ObjectEntry) -> ObjectSolid:
     """The solid that an entry of a scene describes.
 
-    Raises
-    ------
-    UserError
-        If a file is missing or unusable, or a solid cannot be made.
-    ConvergenceError
-        If the modes were not found.
+    Raises UserError if a file is missing or unusable, or a solid cannot be made, and
+    ConvergenceError if the modes were not found.
     """
     if entry.design is not None:
         return _of_design(entry.design)
@@ -184,7 +172,7 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
 
 def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     from carillon.fem.geometry import load_surface
-    from sound.surface import longest_side, struck_surface
+    from sound.strikes import longest_side, struck_surface
 
     surface = struck_surface(mesh, entry.unit)
     # In the mesh's own unit, so that objects which differ by unit alone share their modes.
@@ -205,9 +193,7 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     )
 
 
-def _uniform(
-    surface: trimesh.Trimesh, entry: ObjectEntry, size: float
-) -> tuple[UniformSolid, float]:
+def _uniform(surface: Surface, entry: ObjectEntry, size: float) -> tuple[UniformSolid, float]:
     """The solid inside a surface of size 1, at a size; and the factor of the entry's pitch."""
     material = entry.made_of
     how = Discretised(

@@ -13,10 +13,7 @@ REQUIREMENTS = "workflow/envs/requirements-scenes.txt"
 def scene_package(name: str) -> Any:
     """Import a package that scenes need; only when it is needed, as that takes long.
 
-    Raises
-    ------
-    UserError
-        If it cannot be imported.
+    Raises UserError if it cannot be imported.
     """
     try:
         return import_module(name)

@@ -1,34 +1,105 @@
-"""The result of playing a scene: motion, sound and impacts."""
+"""The result of playing a scene: surfaces, motion and camera, sound and impacts."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from carillon.arrays import Array
-from sound.scenes.picture import Picture
+from carillon.files.atomic import atomic_path
 
 GROUND = -1
 """Number that stands for the ground in pairs of bodies."""
+COLUMNS = (
+    "time_seconds",
+    "first",
+    "second",
+    "x_m",
+    "y_m",
+    "z_m",
+    "impulse_newton_seconds",
+    "approach_metres_per_second",
+    "duration_seconds",
+)
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """The surface of a named object of the scene.
+
+    `vertices` (V, 3) [m] of the triangles `faces` (F, 3) are in the object's own axes, from its
+    centre of mass; `colour` (3,) is red, green and blue from 0 to 1 (sRGB).
+    """
+
+    name: str
+    vertices: Array
+    faces: NDArray[np.integer]
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Positions (T, B, 3) [m] of the centres of mass of B objects at T times [s], at equal steps
+    from 0; z points up.
+
+    `rotations` (T, B, 4) are unit quaternions (w, x, y, z) that turn an object's own axes to those
+    of the scene.
+    """
+
+    times: Array
+    positions: Array
+    rotations: Array
+
+    def at(self, seconds: float) -> tuple[Array, Array]:
+        """Positions (B, 3) [m] and rotations (B, 4) at a time, interpolated between steps."""
+        place = float(np.clip(np.interp(seconds, self.times, np.arange(len(self.times))), 0, None))
+        before = min(int(place), len(self.times) - 1)
+        after = min(before + 1, len(self.times) - 1)
+        share = place - before
+        first, second = self.rotations[before], self.rotations[after]
+        # A quaternion and its negative are one rotation: the nearer one is taken.
+        second = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -second, second)
+        turned = (1.0 - share) * first + share * second
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        moved = (1.0 - share) * self.positions[before] + share * self.positions[after]
+        return moved, turned
+
+
+@dataclass(frozen=True)
+class Camera:
+    """The camera: its position (3,) [m], the target (3,) [m] in the middle of the picture, and its
+    vertical field of view.
+    """
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    degrees: float = 36.0
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The visible part of a scene: surfaces of its objects, in the order of their motion, the
+    height of the ground [m] or None, and the camera.
+    """
+
+    objects: list[Appearance]
+    motion: Motion
+    ground: float | None
+    camera: Camera
 
 
 class Impact(NamedTuple):
-    """An impact of two bodies.
+    """An impact of a pair of bodies by numbers, of which the ground, `GROUND`, is always the
+    second.
 
-    Attributes
-    ----------
-    seconds : float [s]
-        Time at which it begins.
-    pair : (2,)
-        Numbers of the bodies; the ground, `GROUND`, is always the second one.
-    position : (3,) [m]
-        Position in the scene.
-    impulse : (3,) [N s]
-        Impulse on the first body; the second one receives its negative.
-    speed : float [m/s]
-        Speed of approach.
-    duration : float [s]
-        Duration of the contact, by Hertz.
+    It begins at a time [s], at a position (3,) [m] in the scene and a speed of approach [m/s]; the
+    impulse (3,) [N s] is that on the first body, and the duration [s] of the contact is Hertz's.
     """
 
     seconds: float
@@ -41,17 +112,11 @@ class Impact(NamedTuple):
 
 @dataclass(frozen=True)
 class Voice:
-    """The sound of an object that is struck by hand.
+    """The sound of an object that is struck by hand: frequencies (N,) [Hz] and dampings d (N,)
+    [1/s].
 
-    Attributes
-    ----------
-    frequencies : (N,) [Hz]
-        Frequencies of the modes.
-    dampings : (N,) [1/s]
-        Dampings d: amplitudes fall as exp(-d t).
-    gains : (V, N) [full scale]
-        Amplitudes of the modes one metre away after 1 N s inwards at each vertex of the surface,
-        as loud as in the scene's sound.
+    `gains` (V, N) [full scale] are amplitudes of the modes one metre away after 1 N s inwards at
+    each vertex of the surface, as loud as in the scene's sound; they fall as exp(-d t).
     """
 
     frequencies: Array
@@ -65,28 +130,21 @@ class Performance:
 
     Attributes
     ----------
-    title
-        Title of the scene.
-    picture
-        Surfaces, motion and camera.
-    sound : (s, 2) [full scale]
-        Sound at the left and the right ear.
-    rate : int [Hz]
-        Samples per second.
+    title, picture
+        Title of the scene; surfaces, motion and camera.
+    sound, rate : (s, 2) [full scale], int [Hz]
+        Sound at the left and the right ear, and samples per second.
     impacts
         Impacts in the order of time, without rolling and sliding.
-    voices : B voices
-        Sounds of the objects; None for a silent one.
-    scale : float [1/Pa]
-        Full scale per pascal.
+    voices, scale : B voices, float [1/Pa]
+        Sounds of the objects, None for a silent one; full scale per pascal.
     timings : dict [s]
         Wall time of each step of the work.
     accuracies : B dicts
         Expected errors of each object's frequencies, see `sound.scenes.uniform.UniformSolid`; None
         for a silent object, or if they are unknown.
     moved : dict
-        Displacements (3,) [m] by which overlapping objects were separated before the start, by
-        name.
+        Displacements (3,) [m] of overlapping objects that were separated at the start, by name.
     """
 
     title: str
@@ -99,3 +157,34 @@ class Performance:
     timings: dict[str, float] = field(default_factory=dict)
     accuracies: list[dict[str, Any] | None] = field(default_factory=list)
     moved: dict[str, list[float]] = field(default_factory=dict)
+
+
+def linear_light(colour: Sequence[float]) -> Array:
+    """Light of a colour (3,) in sRGB, both from 0 to 1 (IEC 61966-2-1).
+
+    Examples
+    --------
+    >>> linear_light((0.0, 0.5, 1.0)).round(4).tolist()
+    [0.0, 0.214, 1.0]
+    """
+    parts = np.array(colour, dtype=float)
+    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+
+
+def write_impacts(path: str | Path, performance: Performance) -> None:
+    """Write when, where and how hard what struck what; the ground has the name `ground`.
+
+    Raises UserError if the file cannot be written.
+    """
+    names = [each.name for each in performance.picture.objects]
+    with atomic_path(path) as temporary, open(temporary, "w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(COLUMNS)
+        for impact in performance.impacts:
+            pair = ["ground" if each == GROUND else names[each] for each in impact.pair]
+            strength = float(np.linalg.norm(impact.impulse))
+            numbers = [strength, impact.speed, impact.duration]
+            table.writerow(
+                [f"{impact.seconds:.6f}", *pair]
+                + [f"{value:.6g}" for value in (*impact.position, *numbers)]
+            )

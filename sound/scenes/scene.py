@@ -162,8 +162,8 @@ class ObjectEntry:
     def __post_init__(self) -> None:
         given = [key for key in SOURCES if getattr(self, key) is not None]
         if len(given) != 1:
-            found = " and ".join(given) or "none of them"
-            raise ValueError(f"expected one of {', '.join(SOURCES)}, found {found}")
+            named = " and ".join(given) or "none of them"
+            raise ValueError(f"expected one of {', '.join(SOURCES)}, found {named}")
         (source,) = given
         for key, sources in _SUITS.items():
             default = parameters_of(ObjectEntry)[key].default
@@ -303,10 +303,7 @@ class Scene:
 def load_scene(path: str | Path) -> Scene:
     """Read a scene file (YAML), but none of the files that it names.
 
-    Raises
-    ------
-    UserError
-        With one sentence about the first thing that is wrong with it.
+    Raises UserError with one sentence about the first thing that is wrong with it.
     """
     return _in_folder(read_parameters(path, Scene, "a scene"), Path(path).parent)
 
@@ -314,10 +311,7 @@ def load_scene(path: str | Path) -> Scene:
 def scene_of(described: Mapping[str, Any], folder: Path) -> Scene:
     """The scene that the keys and values of a file in `folder` describe.
 
-    Raises
-    ------
-    UserError
-        With one sentence about the first thing that is wrong.
+    Raises UserError with one sentence about the first thing that is wrong.
     """
     return _in_folder(parameters_from(described, Scene), folder)
 

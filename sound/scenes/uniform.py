@@ -10,12 +10,12 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from carillon import __version__
-from carillon.arrays import Array
+from carillon.arrays import Array, Surface
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
@@ -33,10 +33,6 @@ from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors
 from solver.response.response import Damping
 from sound.rendering.solid import SoundingSolid
 
-if TYPE_CHECKING:  # Its import takes long.
-    import trimesh
-
-
 YOUNG, DENSITY = 1e9, 1000.0
 """Young's modulus [Pa] and density [kg/m^3] of the solid whose modes are computed."""
 VOXEL, FINITE_CELL = "voxel", "finite-cell"
@@ -47,18 +43,11 @@ _KIND, _VERSION = "modes of scenes", 1  # counted up, too, when other modes are 
 
 @dataclass(frozen=True)
 class Discretised:
-    """Discretisation of a solid.
+    """Discretisation of a solid, one of `DISCRETISATIONS`, with `resolution` lattice spacings along
+    the longest side.
 
-    Attributes
-    ----------
-    discretisation, resolution
-        One of `DISCRETISATIONS`; number of lattice spacings along the longest side.
-    components
-        Pieces that are kept, see `carillon.fem.geometry.voxelize`.
-    poisson
-        Poisson's ratio.
-    count
-        Number of elastic modes; 0 for the solid alone.
+    `components` are the pieces that are kept, see `carillon.fem.geometry.voxelize`; `count` is the
+    number of elastic modes, 0 for the solid alone.
     """
 
     discretisation: str
@@ -70,17 +59,12 @@ class Discretised:
 
 @dataclass(frozen=True)
 class UniformSolid:
-    """A solid of one material.
+    """A solid of one material: mesh, modulus and density.
 
-    Attributes
-    ----------
-    model
-        Mesh, modulus and density.
-    eigenvalues, modes : (k,) [rad^2/s^2], (n_dofs, k) [kg^-1/2]
-        Ascending, the six rigid ones first; None if none were requested.
-    accuracy : dict
-        Discretisation, resolution, and expected errors of the frequencies as in
-        `solver.refinement.errors.ExpectedErrors.attributes`, if they could be estimated.
+    `eigenvalues` (k,) [rad^2/s^2] and `modes` (n_dofs, k) [kg^-1/2] ascend, the six rigid ones
+    first; they are None if none were requested.  `accuracy` tells discretisation, resolution, and
+    expected errors of the frequencies as in `solver.refinement.errors.ExpectedErrors.attributes`,
+    if they could be estimated.
     """
 
     model: Solid
@@ -125,15 +109,11 @@ class UniformSolid:
         return SoundingSolid.damped(self.model, self.eigenvalues, self.modes, damping)
 
 
-def uniform_solid(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
+def uniform_solid(surface: Surface, name: str, how: Discretised) -> UniformSolid:
     """The solid inside a surface, of `YOUNG` and `DENSITY`, and its modes.
 
-    Raises
-    ------
-    UserError
-        If the surface encloses nothing, walls too thin, or several pieces.
-    ConvergenceError
-        If modes were not found.
+    Raises UserError if the surface encloses nothing, walls too thin, or several pieces, and
+    ConvergenceError if modes were not found.
     """
     if how.count == 0:
         return _without_modes(surface, name, how)
@@ -143,7 +123,7 @@ def uniform_solid(surface: trimesh.Trimesh, name: str, how: Discretised) -> Unif
     return remembered("modes", key.hexdigest(), lambda: _solved(surface, name, how), _read, _write)
 
 
-def _solved(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
+def _solved(surface: Surface, name: str, how: Discretised) -> UniformSolid:
     from solver.analysis.library import solve
 
     solid = _without_modes(surface, name, how)
@@ -159,7 +139,7 @@ def _solved(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSol
     return UniformSolid(solid.model, result.eigenvalues, result.modes, accuracy)
 
 
-def _without_modes(surface: trimesh.Trimesh, name: str, how: Discretised) -> UniformSolid:
+def _without_modes(surface: Surface, name: str, how: Discretised) -> UniformSolid:
     chosen = FINITE_CELL if how.discretisation == AUTO else how.discretisation
     try:
         model = _model(surface, name, how, chosen)
@@ -178,7 +158,7 @@ def _without_modes(surface: trimesh.Trimesh, name: str, how: Discretised) -> Uni
     return UniformSolid(model, None, None, {"discretisation": chosen, "resolution": how.resolution})
 
 
-def _model(surface: trimesh.Trimesh, name: str, how: Discretised, discretisation: str) -> Solid:
+def _model(surface: Surface, name: str, how: Discretised, discretisation: str) -> Solid:
     if discretisation == FINITE_CELL:
         from carillon.fem.finite_cells.build import finite_cells  # Its import takes long.
 
@@ -193,7 +173,7 @@ def _model(surface: trimesh.Trimesh, name: str, how: Discretised, discretisation
 
 
 def _expected(
-    surface: trimesh.Trimesh,
+    surface: Surface,
     name: str,
     how: Discretised,
     model: Solid,

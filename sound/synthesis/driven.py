@@ -1,7 +1,7 @@
 """Modes driven by strikes and lasting forces, with damping that changes over time.
 
-As in `sound.synthesis.bank`, each mode is a complex number x that turns and decays from sample to
-sample, and its sound is Im x.  Forces are added to x before a sample is taken.  Samples are
+As in `sound.synthesis.sinusoids`, each mode is a complex number x that turns and decays from sample
+to sample, and its sound is Im x.  Forces are added to x before a sample is taken.  Samples are
 computed in blocks, within which the damping is constant, for all modes side by side.
 """
 
@@ -12,13 +12,10 @@ from functools import cache
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from solver.response.response import half_sine
 from sound.synthesis.sinusoids import sampled_exponents
-
-Integers = NDArray[np.int64]
 
 BLOCK = 64
 """Number of samples in a block, in which places of forces and dampings are constant."""
@@ -32,54 +29,38 @@ class Excitation:
 
     Attributes
     ----------
-    firsts : (S,)
-        Numbers of the first samples of S strikes, ascending.
-    since : (S,)
-        Time from the beginning of each strike to its first sample, in samples from 0 to 1.
-    durations : (S,) [s]
-        Durations of the strikes' forces, half a sine each.
-    amplitudes : (S, K)
-        Amplitudes of the modes after each strike.
-    blocks : (P,)
-        Numbers of the blocks in which P lasting forces act, ascending.
-    courses : (P, BLOCK)
-        Each lasting force, sample by sample.
+    firsts, since : (S,)
+        Numbers of the first samples of S strikes, ascending, and time from the beginning of each
+        strike to that, in samples from 0 to 1.
+    durations, amplitudes : (S,) [s], (S, K)
+        Durations of the strikes' forces, half a sine each, and amplitudes of the modes after them.
+    blocks, courses : (P,), (P, BLOCK)
+        Numbers of the blocks in which P lasting forces act, ascending; each force by samples.
     pushes : (P, K) [1/s]
         Amplitudes of the modes after a second of each lasting force at magnitude 1.
-    damped : (D,)
-        Numbers of the blocks with added damping, ascending.
-    dampings : (D, K) [1/s]
-        Added dampings of the modes.
+    damped, dampings : (D,), (D, K) [1/s]
+        Numbers of the blocks with added damping, ascending, and that of the modes.
     """
 
-    firsts: Integers
+    firsts: Index
     since: Array
     durations: Array
     amplitudes: Array
-    blocks: Integers
+    blocks: Index
     courses: Array
     pushes: Array
-    damped: Integers
+    damped: Index
     dampings: Array
 
 
 def ring(
     frequencies: Array, dampings: Array, gains: Array, act: Excitation, count: int, rate: int
 ) -> Array:
-    """Samples (count, C) of driven modes.
+    """Samples (count, C) of modes that an excitation drives, with gains (K, C) in each of C
+    channels.
 
-    Parameters
-    ----------
-    frequencies, dampings : (K,) [Hz], [1/s]
-        Frequencies and dampings; modes from half the rate on stay silent.
-    gains : (K, C)
-        Gain of each mode in each of C channels.
-    act
-        Forces on the modes, and added damping.
-    count : int
-        Number of samples.
-    rate : int [Hz]
-        Samples per second.
+    Modes with `frequencies` (K,) [Hz] from half the rate [Hz] on stay silent; `dampings` (K,) are
+    in 1/s.
     """
     exponents, heard = sampled_exponents(frequencies, dampings, rate)
     begun = act.amplitudes * heard * np.exp(act.since[:, None] * exponents)

@@ -12,7 +12,7 @@ from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from carillon.parameters.quantities import Count, between
 from carillon.records.measurement import measured
-from sound.commands.search_options import SearchOptions
+from sound.commands.common_options import SearchOptions
 
 
 @parameters

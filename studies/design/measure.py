@@ -12,10 +12,10 @@ import numpy as np
 
 from carillon.processes.threads import one_thread
 from sound.clips.targets import Targets
-from sound.design.cents import rms_cents
 from sound.design.objective import fall
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
+from sound.design.pitch import rms_cents
 from sound.design.preparation import DesignProblem, prepare
 from sound.design.simulation import Evaluation
 from sound.project.design import Design

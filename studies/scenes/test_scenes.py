@@ -13,7 +13,7 @@ import yaml
 
 from sound.clips.wav import read_wav
 from sound.scenes.materials import MATERIALS, named_material
-from sound.scenes.playing.impact_list import COLUMNS
+from sound.scenes.performance import COLUMNS
 from sound.scenes.scene import Scene, load_scene
 from studies.scenes import tables
 from studies.scenes.config import ScenesSection

@@ -16,7 +16,7 @@ from sound.clips.wav import read_wav
 from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import resampled
-from sound.synthesis.bank import Bank, ring
+from sound.synthesis.sinusoids import Bank, ring
 from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.sounds.examples import DESIGN, REACHED, START, TRUTH, Example, examples

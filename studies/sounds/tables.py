@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES
-from sound.design.bark import bark
-from sound.design.cents import cents, common_factor
 from sound.design.objective import fall
+from sound.design.pitch import bark, cents, common_factor
 from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
 from studies.base.conditions import ONE_COLD_RUN, measured

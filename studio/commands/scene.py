@@ -90,7 +90,6 @@ def _scene(options: SceneOptions) -> Scene:
 
 
 def _require_outputs(options: SceneOptions, scene: Scene) -> None:
-    """Refuse names that nothing can be written under, and two of one name, before the work."""
     from sound.outputs import require_output
 
     inputs = [*scene.files, *([] if options.scene == BARS else [options.scene])]
@@ -111,7 +110,7 @@ def _write(options: SceneOptions, performance: Performance) -> None:
 
     write_wav(options.out, performance.sound, performance.rate)
     if options.impacts is not None:
-        from sound.scenes.playing.impact_list import write_impacts
+        from sound.scenes.performance import write_impacts
 
         write_impacts(options.impacts, performance)
     if options.gltf is not None:
@@ -156,20 +155,19 @@ def _accuracies(performance: Performance) -> dict[str, dict[str, Any] | None]:
     """How far frequencies of each object that sounds are expected to be off; None if unknown."""
     accuracies = performance.accuracies or [None] * len(performance.voices)
     names = [each.name for each in performance.picture.objects]
-    told = zip(names, accuracies, performance.voices)
-    return {name: accuracy for name, accuracy, voice in told if voice is not None}
+    known = zip(names, accuracies, performance.voices)
+    return {name: accuracy for name, accuracy, voice in known if voice is not None}
 
 
 def _expected(accuracies: dict[str, dict[str, Any] | None]) -> str:
-    """What is said of the object whose frequencies are expected to be farthest off."""
     from solver.refinement.errors import FROM_SOLID, in_words
 
     worst = f"{FROM_SOLID}_worst"
-    told = {name: each for name, each in accuracies.items() if each and worst in each}
-    if not told:
+    known = {name: each for name, each in accuracies.items() if each and worst in each}
+    if not known:
         return ""
-    name = max(told, key=lambda name: abs(told[name][worst]))
-    return f"\nexpected distance from the solid, of {name!r} {in_words(told[name], FROM_SOLID)}"
+    name = max(known, key=lambda name: abs(known[name][worst]))
+    return f"\nexpected distance from the solid, of {name!r} {in_words(known[name], FROM_SOLID)}"
 
 
 def _sentence(summary: dict[str, Any]) -> str:

@@ -8,6 +8,8 @@ was designed is kept in the workspace.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -91,54 +93,46 @@ def run(arguments: argparse.Namespace) -> int:
         workspace = _workspace(options)
         studio = open_studio(options.what, workspace)
         keys = Keys()
-        launch = _Launch(options, listener, keys, workspace)
-        try:
-            serve(studio, listener, options.host, keys, ready=launch.tell)
-        finally:
-            launch.clear()
+        with _launching(options, listener, keys, workspace) as tell:
+            serve(studio, listener, options.host, keys, ready=tell)
     say("the studio has ended")
     return 0
 
 
-class _Launch:
-    """Tells where the page is, and opens it."""
+@contextmanager
+def _launching(
+    options: StudioOptions, listener: socket.socket, keys: Keys, workspace: Path
+) -> Iterator[Callable[[], None]]:
+    """A function that says where the page is, and opens it; in the end what leads there goes."""
+    from studio.server.browser import open_page
+    from studio.server.guard import is_loopback
+    from studio.server.serve import address_of
 
-    def __init__(
-        self, options: StudioOptions, listener: socket.socket, keys: Keys, workspace: Path
-    ) -> None:
-        from studio.server.guard import is_loopback
-        from studio.server.serve import address_of
+    url = f"{address_of(listener, options.host)}?token={keys.token}"
+    file: Path | None = None
 
-        self._url = f"{address_of(listener, options.host)}?token={keys.token}"
-        self._browser = not options.no_browser
-        self._local = is_loopback(options.host)
-        self._workspace = workspace
-        self._file: Path | None = None
-
-    def tell(self) -> None:
-        """Say where the page is; called once it is there."""
-        if not self._local:
+    def tell() -> None:
+        nonlocal file
+        if not is_loopback(options.host):
             say(
                 "other machines can reach this studio, and what is sent is not encrypted; from "
                 "such an address browsers give no sound, either; a tunnel to this machine (ssh -L) "
                 "needs no --host"
             )
         # Standard output, for programs that start the studio.
-        print(self._url, flush=True)
-        say(f"the studio is at this address, its projects are in {self._workspace}; Ctrl-C ends it")
-        if self._browser:
-            from studio.server.browser import open_page
+        print(url, flush=True)
+        say(f"the studio is at this address, its projects are in {workspace}; Ctrl-C ends it")
+        if not options.no_browser:
+            file = open_page(url, workspace)
 
-            self._file = open_page(self._url, self._workspace)
-
-    def clear(self) -> None:
-        """Remove what led the browser to the page."""
-        if self._file is not None:
-            self._file.unlink(missing_ok=True)
+    try:
+        yield tell
+    finally:
+        if file is not None:
+            file.unlink(missing_ok=True)
 
 
 def _workspace(options: StudioOptions) -> Path:
-    """The folder of projects, made if it is not there."""
     named = options.workspace
     if named is None:
         is_file = options.what is not None and not options.what.startswith(BUILTIN)
@@ -161,7 +155,6 @@ def _workspace(options: StudioOptions) -> Path:
 
 
 def _export(page: str, design: str | None) -> int:
-    """Write a page of a design."""
     if design is None:
         raise UserError(f"--export {page}: name the design to write: --export {page} design.h5")
     from sound.outputs import require_output

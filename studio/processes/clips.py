@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sound.clips.extraction import remarks
 from sound.clips.files import extract_file
 from sound.clips.noise import noise_part
-from sound.clips.remarks import remarks
 from sound.clips.wav import as_wav, read_wav
 
 LEAST_SHARE = 1e-12
@@ -33,14 +33,14 @@ class ClipsBench:
 
     def listen(self, clip: ClipFile) -> dict[str, Any]:
         """Modes of a clip, and what is to be said of them, as the page gets it."""
-        found = extract_file(clip.path, allow_clipped=clip.allow_clipped)
-        left = max(LEAST_SHARE, 1.0 - found.evidence["explained"])
-        modes = zip(found.frequencies, found.dampings, found.amplitudes)
+        sound = extract_file(clip.path, allow_clipped=clip.allow_clipped)
+        left = max(LEAST_SHARE, 1.0 - sound.evidence["explained"])
+        modes = zip(sound.frequencies, sound.dampings, sound.amplitudes)
         return {
-            "seconds": len(found.residual) / found.rate,
-            "rate_hz": found.rate,
+            "seconds": len(sound.residual) / sound.rate,
+            "rate_hz": sound.rate,
             "explained_decibels": float(-10.0 * np.log10(left)),
-            "says": remarks(found.evidence),
+            "says": remarks(sound.evidence),
             "modes": [
                 {"hertz": float(f), "damping_per_second": float(d), "amplitude": float(a)}
                 for f, d, a in modes
@@ -51,11 +51,11 @@ class ClipsBench:
         """The clip itself (`sound`), its `modes`, its `rest` or the `noise` of that, as WAV."""
         if part == "sound":
             return as_wav(*read_wav(clip.path, clip.allow_clipped))
-        found = extract_file(clip.path, allow_clipped=clip.allow_clipped)
+        sound = extract_file(clip.path, allow_clipped=clip.allow_clipped)
         if part == "modes":
-            return as_wav(found.modal_part(), found.rate)
-        rest = found.residual
-        return as_wav(rest if part == "rest" else noise_part(rest, found.rate)[0], found.rate)
+            return as_wav(sound.modal_part(), sound.rate)
+        rest = sound.residual
+        return as_wav(rest if part == "rest" else noise_part(rest, sound.rate)[0], sound.rate)
 
     def spectrum(self, clip: ClipFile) -> dict[str, list[float]]:
         """Levels of a clip's spectrum below its loudest, by ascending frequencies."""

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 from carillon.errors import UserError
 from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import write_wav
-from sound.export.embedded import write_embedded
-from sound.export.faust import write_faust
-from sound.export.gltf import write_gltf
-from sound.export.moduli import write_moduli
+from sound.export.formats import export_design
 from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render, ringing_seconds
 from sound.rendering.solid import SoundingSolid
-
-FAUST_POINTS = 0
-"""Points to strike in a Faust program besides those of the targets."""
 
 
 class Exports:
@@ -27,27 +18,15 @@ class Exports:
 
     def make(self, design: str, kind: str, target: str | None, out: str) -> None:
         """Write a design in the form `kind` to the file `out`."""
-        found = read_design(design)
+        finished = read_design(design)
         if kind == "wav":
-            _write_strike(found, target, out)
+            _write_strike(finished, target, out)
+        elif kind == "html":
+            from studio.standalone import write_page
+
+            write_page(out, finished)
         else:
-            _WRITERS[kind](out, found)
-
-
-def _write_page(out: str, design: Design) -> None:
-    from studio.standalone import write_page
-
-    write_page(Path(out), design)
-
-
-_WRITERS: dict[str, Callable[[str, Design], None]] = {
-    "h5": lambda out, design: write_embedded(out, design, {}),
-    "gltf": lambda out, design: write_gltf(out, design, binary=False),
-    "glb": lambda out, design: write_gltf(out, design, binary=True),
-    "dsp": lambda out, design: write_faust(out, design, FAUST_POINTS),
-    "npy": write_moduli,
-    "html": _write_page,
-}
+            export_design(out, finished, kind)
 
 
 def _write_strike(design: Design, target: str | None, out: str) -> None:

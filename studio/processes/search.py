@@ -9,14 +9,15 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from sound.design.optimise import optimise
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search
 from sound.design.tasks import SearchStep
+from sound.project.design import HISTORY, HISTORY_TYPE
 from sound.project.design_file import read_design, write_design
-from studio.processes.history import history_of, rows_of
 
 Tell = Callable[[dict[str, Any]], None]
 
@@ -105,7 +106,6 @@ class _News:
 def _row(
     entry: HistoryEntry, best: tuple[SearchStep, Array] | None, is_new: bool, seconds: float
 ) -> dict[str, Any]:
-    """News: the cost, and the material if there is another one."""
     cost = entry.cost if best is None else best[0].cost
     news: dict[str, Any] = {
         "seconds": max(entry.seconds, seconds),
@@ -119,3 +119,13 @@ def _row(
         step, hertz = best
         news |= {"z": step.z.tolist(), "hertz": hertz.tolist()}
     return news
+
+
+def rows_of(history: NDArray[np.void]) -> list[dict[str, float]]:
+    """A design's history as the page gets it, one row for each entry."""
+    return [dict(zip(HISTORY, entry, strict=True)) for entry in history.tolist()]
+
+
+def history_of(rows: Sequence[Mapping[str, Any]]) -> NDArray[np.void]:
+    """The history of a design whose rows are these."""
+    return np.array([tuple(row[name] for name in HISTORY) for row in rows], HISTORY_TYPE)

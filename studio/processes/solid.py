@@ -21,10 +21,10 @@ from solver.files.modes_file import frequencies
 from solver.response.points import interpolation
 from solver.response.response import Damping
 from solver.response.vertices import inward_normals
-from sound.design.cents import common_factor
 from sound.design.descent import cost_of
 from sound.design.fine_check import FINE_TOLERANCE
 from sound.design.optimise import optimise
+from sound.design.pitch import common_factor
 from sound.design.preparation import (
     DesignProblem,
     PreparedSolid,
@@ -32,17 +32,16 @@ from sound.design.preparation import (
     prepare,
     prepared_solid,
 )
-from sound.design.simulation import Evaluation, Simulation
+from sound.design.simulation import TOLERANCE, Evaluation, Simulation
 from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
-from sound.strikes import Place, Strike, locate_all
-from sound.surface import longest_side, struck_surface
+from sound.strikes import Place, Strike, locate_all, longest_side, struck_surface
 from studio.binary import pack
 from studio.processes.bank import Aim, Heard, bank
-from studio.processes.history import history_of
+from studio.processes.search import history_of
 
 MODES = 30
 """Elastic modes of a solid that has no targets yet."""
@@ -138,9 +137,9 @@ class SolidProcess:
         once = replace(project.optimiser, seconds=None, evaluations=1, workers=1)
         problem = replace(self._problem, project=replace(project, optimiser=once))
         at = None if z is None else np.asarray(z)
-        found = optimise(problem, coordinates=at, history=history_of(rows))
-        write_design(out, found)
-        return found.coordinates.tolist()
+        made = optimise(problem, coordinates=at, history=history_of(rows))
+        write_design(out, made)
+        return made.coordinates.tolist()
 
     def bank(
         self,
@@ -148,12 +147,8 @@ class SolidProcess:
         header: dict[str, Any],
         hertz: Array | None = None,
     ) -> bytes:
-        """The bank of a material; of the uniform one if z is None.
-
-        Parameters
-        ----------
-        hertz : (N,) [Hz] or None
-            What its modes are known to sound at, in their order.
+        """The bank of a material, of the uniform one if z is None, whose modes are known to sound
+        at `hertz` (N,).
         """
         return self._bank(self._sounding(), z, header, hertz)
 
@@ -167,17 +162,17 @@ class SolidProcess:
 
     def bank_of(self, design: str, header: dict[str, Any]) -> bytes:
         """The bank of a design in a file: by its own modes, if it is of the present targets."""
-        found = read_design(design)
-        if not self._is_of_targets(found):
-            return self.bank(self._coordinates(found), header)
+        made = read_design(design)
+        if not self._is_of_targets(made):
+            return self.bank(self._coordinates(made), header)
         sounding = self._sounding()
         heard = Heard(
-            found.frequencies,
-            found.dampings,
-            sounding.pushed(found.model, found.elastic_modes, self._inward),
-            self._at_vertices(found.young),
+            made.frequencies,
+            made.dampings,
+            sounding.pushed(made.model, made.elastic_modes, self._inward),
+            self._at_vertices(made.young),
         )
-        cost = {"cost": found.evidence.get("cost")}
+        cost = {"cost": made.evidence.get("cost")}
         return bank(heard, self._positions, self._aimed(), {**cost, **header})
 
     def fine_bank_of(self, design: str, header: dict[str, Any]) -> bytes:
@@ -187,9 +182,9 @@ class SolidProcess:
     def _is_of_targets(self, design: Design) -> bool:
         if self._problem is None:
             return False
-        wanted = self._problem.setting.objective.targets
-        return design.targets.names == wanted.names and np.array_equal(
-            design.targets.frequencies, wanted.frequencies
+        targets = self._problem.setting.objective.targets
+        return design.targets.names == targets.names and np.array_equal(
+            design.targets.frequencies, targets.frequencies
         )
 
     def _coordinates(self, design: Design) -> list[float] | None:
@@ -212,7 +207,7 @@ class SolidProcess:
             evaluation = sounding.evaluate(at)
         own = frequencies(evaluation.eigenvalues) if hertz is None else np.asarray(hertz)
         elastic = sounding.elastic(evaluation)
-        aim, young, told = self._aimed(), material.moduli(at), dict(header)
+        aim, young, keys = self._aimed(), material.moduli(at), dict(header)
         dampings = None
         if aim is None:
             dampings = Damping().decay_per_second(evaluation.eigenvalues)
@@ -221,10 +216,10 @@ class SolidProcess:
             stretch = common_factor(np.sort(own), aim.targets.frequencies)
             own, young = stretch * own, stretch**2 * young
             objective = self._problem.setting.objective
-            told.setdefault("cost", cost_of(objective, material, evaluation).total)
+            keys.setdefault("cost", cost_of(objective, material, evaluation).total)
         pushed = sounding.pushed(sounding.model, elastic, self._inward)
         heard = Heard(own, dampings, pushed, self._at_vertices(young))
-        return bank(heard, self._positions, aim, {"cost": None, **told})
+        return bank(heard, self._positions, aim, {"cost": None, **keys})
 
     @property
     def _positions(self) -> Array:
@@ -238,12 +233,11 @@ class SolidProcess:
         return Aim(setting.objective.targets, vertices)
 
     def _at_vertices(self, young: Array) -> Array:
-        """Moduli (V,) [Pa] of the voxels that are nearest to the vertices."""
         return np.asarray(young[self._sounding().nearest])
 
     def _sounding(self) -> _Sounding:
         if self._own is None:
-            simulation = self._simulation(self._setting(), None)
+            simulation = self._simulation(self._setting())
             self._own = _Sounding(simulation, self._surface, self._prepared)
         return self._own
 
@@ -256,19 +250,9 @@ class SolidProcess:
         nothing: Any = None
         return Setting(parts.mesh, self._solid, parts.material, [anywhere], nothing, parts.cells)
 
-    def _simulation(self, setting: Setting, tolerance: float | None) -> Simulation:
+    def _simulation(self, setting: Setting, tolerance: float = TOLERANCE) -> Simulation:
         with one_thread():
-            if self._problem is not None:
-                return setting.simulation() if tolerance is None else setting.simulation(tolerance)
-            return Simulation(
-                setting.mesh,
-                setting.options,
-                setting.material,
-                setting.strikes,
-                MODES,
-                **({} if tolerance is None else {"tolerance": tolerance}),
-                cells=setting.cells,
-            )
+            return setting.simulation(tolerance, None if self._problem is not None else MODES)
 
 
 class _Sounding:

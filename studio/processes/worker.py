@@ -64,20 +64,11 @@ class Worker:
     async def call(
         self, name: str, *arguments: Any, seconds: float | None = None, tell: Tell | None = None
     ) -> Any:
-        """What a method returns.
+        """What a method returns; `tell` is called with news of one that has some.
 
-        Parameters
-        ----------
-        seconds
-            Of processor time after which the process is ended: on a busy machine, where it hardly
-            gets any, it is waited for longer.
-        tell
-            Called with news of a method that has some.
-
-        Raises
-        ------
-        UserError
-            What the method raises, in one sentence; or if it took too long, or the process ended.
+        Raises UserError with what the method raises, in one sentence, or if the process ended, or
+        took more than so many seconds of processor time and was ended: on a busy machine, where it
+        hardly gets any, it is waited for longer.
         """
         self.start()
         assert self._pipe is not None
@@ -143,7 +134,6 @@ class Worker:
     def _listen(
         self, loop: asyncio.AbstractEventLoop, pipe: Connection, process: SpawnProcess
     ) -> None:
-        """Bring what the process says into the loop, until it is gone."""
         try:
             while True:
                 loop.call_soon_threadsafe(self._take, pipe.recv())
@@ -187,7 +177,6 @@ class Worker:
 
 
 def _serve(pipe: Connection, work: str) -> None:
-    """What the process does: it calls methods until its parent is gone."""
     os.nice(NICER)
     os.environ["OMP_NUM_THREADS"] = "1"
     module, name = work.split(":")
@@ -210,7 +199,6 @@ def _teller(pipe: Connection, number: int) -> Tell:
 
 
 def _sentences(error: Exception) -> tuple[str, ...]:
-    """What to tell of an error; of a fault of the program, where to look."""
     if isinstance(error, UserError):
         return tuple(str(each) for each in error.args)
     sentence = meaning(error)[1]

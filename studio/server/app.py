@@ -17,8 +17,7 @@ from carillon.errors import UserError
 from carillon.parameters.schema import schema_of
 from sound.project.project import Project
 from studio.interface import CLIP_PARTS, EXPORTS, NotFoundError, Studio
-from studio.server.answers import fault
-from studio.server.guard import Guard, Keys
+from studio.server.guard import Guard, Keys, fault
 from studio.server.page_files import page_table, send_file, send_page
 from studio.server.socket import OWN_FAULT, sentence_of, talk
 from studio.server.uploads import (
@@ -43,18 +42,10 @@ def make_app(
     limits: Limits | None = None,
     let_in: Callable[[Any], None] | None = None,
 ) -> Guard:
-    """The studio as an ASGI application, guarded.
+    """The studio as an ASGI application, guarded by the keys of this run, for a server at host and
+    port.
 
-    Parameters
-    ----------
-    keys
-        Secrets of this run.
-    host, port
-        Where the server listens.
-    limits
-        What it bears.
-    let_in
-        Told the address of a client that may ask.
+    `let_in` is told the address of a client that may ask.
     """
     routes = _Routes(studio, limits or Limits())
     app = Starlette(
@@ -77,8 +68,6 @@ def make_app(
 
 
 class _Routes:
-    """Answers, made from what the studio says."""
-
     def __init__(self, studio: Studio, limits: Limits) -> None:
         self._studio, self._limits = studio, limits
         self._table = page_table()
@@ -88,8 +77,8 @@ class _Routes:
         return send_page()
 
     async def file(self, request: Request) -> Response:
-        found = send_file(request, self._table)
-        return fault("the page has no such file", 404) if found is None else found
+        file = send_file(request, self._table)
+        return fault("the page has no such file", 404) if file is None else file
 
     async def schema(self, request: Request) -> Response:
         return JSONResponse(schema_of(Project))

@@ -16,14 +16,10 @@ NAME = "open-studio.html"
 
 
 def open_page(url: str, folder: Path) -> Path | None:
-    """Open an address with a token; the file that leads there, to be removed later.
+    """Open an address with a token; the file in a folder that leads there, to be removed later.
 
     The address is not given to the browser itself: command lines are seen by all on a machine.
-
-    Parameters
-    ----------
-    folder
-        Where the file goes, which only its owner may read.
+    Only the file's owner may read it.
     """
     if not _has_screen():
         return None

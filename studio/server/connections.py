@@ -6,7 +6,7 @@ import asyncio
 import resource
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
@@ -21,14 +21,7 @@ RESERVED = 128
 Client = tuple[str, int]
 
 
-class Timer(Protocol):
-    """Something that is due, and can be called off."""
-
-    def cancel(self) -> None:
-        """Let nothing happen."""
-
-
-def _later(seconds: float, function: Callable[[], None]) -> Timer:
+def _later(seconds: float, function: Callable[[], None]) -> asyncio.TimerHandle:
     return asyncio.get_running_loop().call_later(seconds, function)
 
 
@@ -38,31 +31,22 @@ class _Connection:
 
     transport: asyncio.Transport
     client: Client | None
-    due: Timer | None
+    due: asyncio.TimerHandle | None
 
 
 class Connections:
-    """Connections to a server; used in the thread of its event loop alone.
+    """Connections to a server, `most` at a time; used in the thread of its event loop alone.
 
     One is let in once it has asked for something that it may have.  One that was not ends after
     some seconds, whatever it says meanwhile, and makes room where there are too many: so whoever
-    has no token keeps out nobody who has one.
-
-    Parameters
-    ----------
-    most
-        That are open at a time.
-    seconds
-        Time in which each has to be let in.
-    later
-        Calls a function after some seconds; that of the event loop unless another one is given.
+    has no token keeps out nobody who has one.  `later` calls a function after some seconds.
     """
 
     def __init__(
         self,
         most: int,
         seconds: float,
-        later: Callable[[float, Callable[[], None]], Timer] = _later,
+        later: Callable[[float, Callable[[], None]], Any] = _later,
     ) -> None:
         self._most, self._seconds, self._later = most, seconds, later
         self._open: dict[asyncio.Transport, _Connection] = {}
@@ -87,9 +71,9 @@ class Connections:
 
     def closed(self, transport: asyncio.Transport) -> None:
         """Forget a connection that has ended."""
-        found = self._open.pop(transport, None)
-        if found is not None and found.due is not None:
-            found.due.cancel()
+        known = self._open.pop(transport, None)
+        if known is not None and known.due is not None:
+            known.due.cancel()
 
     def let_in(self, client: Any) -> None:
         """Let the connection of a client stay, by the client's address and port."""
@@ -99,7 +83,6 @@ class Connections:
                 each.due = None
 
     def _make_room(self) -> bool:
-        """End the connection that has waited longest; whether there was one."""
         oldest = next((each for each in self._open.values() if each.due is not None), None)
         if oldest is not None:
             self._end(oldest.transport)
@@ -110,12 +93,12 @@ class Connections:
         transport.abort()
 
 
-def most_connections(wanted: int) -> int:
+def most_connections(requested: int) -> int:
     """Connections that may be open at a time, so that descriptors are left for files."""
     allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if allowed == resource.RLIM_INFINITY:
-        return wanted
-    return min(wanted, max(LEAST, allowed - RESERVED))
+        return requested
+    return min(requested, max(LEAST, allowed - RESERVED))
 
 
 def protocols(
@@ -123,16 +106,9 @@ def protocols(
 ) -> tuple[type[asyncio.Protocol], type[asyncio.Protocol]]:
     """Protocols of the server, for HTTP and WebSockets, that tell of their connections."""
 
-    class Http(H11Protocol):
-        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-            super().connection_made(transport)
-            connections.opened(transport)
+    class Counted(asyncio.Protocol):
+        transport: asyncio.Transport
 
-        def connection_lost(self, exc: Exception | None) -> None:
-            connections.closed(self.transport)
-            super().connection_lost(exc)
-
-    class Page(WebSocketsSansIOProtocol):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
             assert isinstance(transport, asyncio.Transport)
             super().connection_made(transport)
@@ -141,5 +117,11 @@ def protocols(
         def connection_lost(self, exc: Exception | None) -> None:
             connections.closed(self.transport)
             super().connection_lost(exc)
+
+    class Http(Counted, H11Protocol):  # type: ignore[misc]
+        pass
+
+    class Page(Counted, WebSocketsSansIOProtocol):  # type: ignore[misc]
+        pass
 
     return Http, Page

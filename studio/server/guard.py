@@ -9,13 +9,14 @@ import secrets
 import socket
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.datastructures import MutableHeaders
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-
-from studio.server.answers import entrance, refusal
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 """Names of this machine that no other one can take on."""
@@ -36,18 +37,22 @@ HEADERS = {
 _HOST = re.compile(
     r"(?P<name>[A-Za-z0-9.-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\])(:(?P<port>[0-9]{1,5}))?"
 )
+_NO_COOKIE = (
+    "this browser has not been let in yet, or the studio was started anew; open the address that "
+    "the command printed, all of it"
+)
+_PAGE = (
+    '<!doctype html><html lang="en"><head><meta charset="utf-8">{head}'
+    '<meta name="viewport" content="width=device-width"><title>Carillon studio</title>'
+    '<meta name="color-scheme" content="light dark"></head>'
+    "<body><h1>Carillon studio</h1><p>{text}</p></body></html>"
+)
 
 
 @dataclass(frozen=True)
 class Keys:
-    """Secrets of one run.
-
-    Attributes
-    ----------
-    token
-        Stands in the address that is printed, and is good for a cookie.
-    cookie
-        What the cookie holds.
+    """Secrets of one run: the token stands in the address that is printed, and is good for a
+    cookie.
     """
 
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
@@ -58,20 +63,9 @@ class Guard:
     """Lets through what comes from the studio's own page; an ASGI application around another.
 
     Names that others can point at this machine (DNS rebinding) are refused by their Host, pages of
-    other origins by their Origin, everybody else by the lack of the cookie.
-
-    Parameters
-    ----------
-    app
-        What is guarded.
-    keys
-        Secrets of this run.
-    host
-        Address that the server listens on.
-    port
-        Port that it listens on; the cookie is named after it, as cookies are the same for all.
-    let_in
-        Told the address of each client that may ask, before it is answered.
+    other origins by their Origin, everybody else by the lack of the cookie, which is named after
+    the server's port, as cookies are the same for all.  `let_in` is told the address of each client
+    that may ask, before it is answered.
     """
 
     def __init__(
@@ -110,7 +104,6 @@ class Guard:
             self._let_in(scope.get("client"))
 
     def _fault(self, scope: Scope) -> str | None:
-        """What is wrong with where a request is sent, or with where it comes from."""
         hosts, origins = _values(scope, b"host"), _values(scope, b"origin")
         if len(hosts) != 1 or not self._is_own(hosts[0]):
             return (
@@ -175,12 +168,6 @@ def cookie_values(header: str, name: str) -> list[str]:
     return [value.strip(" \t") for key, _, value in parts if key.strip(" \t") == name]
 
 
-_NO_COOKIE = (
-    "this browser has not been let in yet, or the studio was started anew; open the address that "
-    "the command printed, all of it"
-)
-
-
 def host_names(host: str) -> frozenset[str]:
     """Names under which a server that listens on `host` may be asked."""
     names = {*LOOPBACK}
@@ -211,14 +198,11 @@ def _same(given: str, secret: str) -> bool:
 
 
 def _values(scope: Scope, name: bytes) -> list[str]:
-    """Values of all headers of a name, as they were sent."""
     headers: Iterable[tuple[bytes, bytes]] = scope["headers"]
     return [value.decode("latin-1") for key, value in headers if key.lower() == name]
 
 
 def _with_headers(send: Send) -> Send:
-    """`send` that adds what all answers say."""
-
     async def sending(message: Message) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
             headers = MutableHeaders(scope=message)
@@ -231,3 +215,40 @@ def _with_headers(send: Send) -> Send:
         await send(message)
 
     return sending
+
+
+def fault(sentence: str, status: int = 400) -> JSONResponse:
+    """What is wrong, for the page."""
+    return JSONResponse({"error": sentence}, status)
+
+
+def entrance(cookie: str, value: str) -> Response:
+    """Sets the cookie and leads to the page.
+
+    It is a page of its own that leads on: browsers withhold a strict cookie from where a redirect
+    leads if what led to that is another site, such as a terminal in the browser.
+    """
+    refresh = '<meta http-equiv="refresh" content="0;url=/">'
+    answer = _words('<a href="/">The studio opens.</a>', refresh)
+    answer.set_cookie(cookie, value, path="/", httponly=True, samesite="strict")
+    return answer
+
+
+async def refusal(scope: Scope, receive: Receive, send: Send, status: int, sentence: str) -> None:
+    """Refuse a request or a WebSocket; people get a page, others JSON."""
+    if scope["type"] == "websocket":
+        if "websocket.http.response" in scope.get("extensions", {}):
+            answer: Response = fault(sentence, status)
+            await answer(scope, receive, send)
+        else:
+            await send({"type": "websocket.close", "code": 1008})
+        return
+    request = Request(scope)
+    wants_page = scope["path"] == "/" and "text/html" in request.headers.get("accept", "")
+    answer = _words(escape(sentence), status=status) if wants_page else fault(sentence, status)
+    answer.headers["Connection"] = "close"
+    await answer(scope, receive, send)
+
+
+def _words(text: str, head: str = "", status: int = 200) -> HTMLResponse:
+    return HTMLResponse(_PAGE.format(head=head, text=text), status)

@@ -37,19 +37,10 @@ ENDINGS = tuple(
 
 
 def listen(host: str, port: int | None) -> socket.socket:
-    """A socket that listens.
+    """A socket that listens at an address, or a name of one, and a port.
 
-    Parameters
-    ----------
-    host
-        Address, or a name of one.
-    port
-        None takes the first free one from `FIRST_PORT` on.
-
-    Raises
-    ------
-    UserError
-        If the port is in use or not allowed, or the address is not one of this machine's.
+    None takes the first free one from `FIRST_PORT` on.  Raises UserError if the port is in use or
+    not allowed, or the address is not one of this machine's.
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(
@@ -93,10 +84,7 @@ def serve(
 ) -> None:
     """Serve until Ctrl-C, or a signal that asks to end; then close the studio.
 
-    Parameters
-    ----------
-    ready
-        Called once requests are answered.
+    `ready` is called once requests are answered.
     """
     server = make_server(studio, listener, host, keys, limits or Limits())
     with _ended_by_signals():
@@ -117,7 +105,7 @@ def make_server(
         connections = Connections(most, limits.waiting_seconds)
     http, page = protocols(connections)
     # Of what uvicorn tells, faults of the program's alone are of use to people.
-    logging.getLogger("uvicorn.error").addFilter(_is_fault)
+    logging.getLogger("uvicorn.error").addFilter(lambda record: record.exc_info is not None)
     config = uvicorn.Config(
         make_app(studio, keys, host, listener.getsockname()[1], limits, connections.let_in),
         http=http,
@@ -182,10 +170,6 @@ def _ended_by_signals() -> Iterator[None]:
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
-
-
-def _is_fault(record: logging.LogRecord) -> bool:
-    return record.exc_info is not None
 
 
 def _in_main_thread() -> bool:

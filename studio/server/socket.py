@@ -69,7 +69,6 @@ async def _listen(page: WebSocket, studio: Studio, feed: Feed) -> None:
 
 
 async def _serve(text: str | None, studio: Studio, feed: Feed) -> None:
-    """Do what a message says, and reply."""
     number: int | str | None = None
     try:
         if text is None:

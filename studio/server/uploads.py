@@ -25,18 +25,12 @@ class Limits:
 
     Attributes
     ----------
-    mesh_bytes, clip_bytes
-        Of uploaded files.
-    message_bytes
-        Of what the page says on its WebSocket.
-    idle_seconds
-        Time in which an upload has to go on.
-    upload_seconds
-        Time in which it has to end.
-    uploads
-        How many may go on at a time.
-    connections
-        How many may be open at a time.
+    mesh_bytes, clip_bytes, message_bytes
+        Of uploaded files, and of what the page says on its WebSocket.
+    idle_seconds, upload_seconds
+        Time in which an upload has to go on, and to end.
+    uploads, connections
+        How many may go on, and be open, at a time.
     waiting_seconds
         Time in which a connection has to ask for something that it may have.
     """
@@ -60,22 +54,11 @@ class UploadError(Exception):
 
 
 async def read_upload(request: Request, most: int, limits: Limits, what: str) -> bytes:
-    """The body of a request.
+    """The body of a request of at most so many bytes; `what` it is, "a mesh", is for messages.
 
     Of one that is too large as much again is read and dropped, as browsers listen to an answer only
-    when they have sent all.
-
-    Parameters
-    ----------
-    most
-        Bytes that are accepted.
-    what
-        What is uploaded, for messages: "a mesh".
-
-    Raises
-    ------
-    UploadError
-        If it is empty (400), too large (413), or too slow (408).
+    when they have sent all.  Raises UploadError if it is empty (400), too large (413), or too slow
+    (408).
     """
     too_large = UploadError(
         413, f"the file is larger than {most / (1 << 20):g} MiB, which is the most for {what}"
@@ -120,21 +103,9 @@ async def _pieces(request: Request, idle_seconds: float) -> AsyncGenerator[bytes
 
 
 def upload_name(name: str, what: str, endings: tuple[str, ...]) -> str:
-    """Name under which a file is kept.
+    """Name under which a file is kept, from what the page tells; `what` it is is for messages.
 
-    Parameters
-    ----------
-    name
-        As the page tells it.
-    what
-        What is uploaded, for messages: "a mesh".
-    endings
-        Those that it may have, with their dots.
-
-    Raises
-    ------
-    UploadError
-        If it has another ending.
+    Raises UploadError if it has none of the endings.
     """
     plain = plain_name(name, what.split()[-1])
     if PurePosixPath(plain).suffix.lower() not in endings:
@@ -143,12 +114,7 @@ def upload_name(name: str, what: str, endings: tuple[str, ...]) -> str:
 
 
 def plain_name(name: str, otherwise: str) -> str:
-    """The last part of a path as a name that is safe on any system.
-
-    Parameters
-    ----------
-    otherwise
-        Name if nothing is left.
+    """The last part of a path as a name that is safe on any system; `otherwise` if nothing is left.
 
     Examples
     --------

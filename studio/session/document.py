@@ -1,9 +1,9 @@
-"""What is designed, as one immutable value: snapshots of it are what undo goes back to."""
+"""What is designed, as one immutable value, and undo and redo by snapshots of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from sound.project.project import Project, project_of
 NO_CLIP = "none"
 _ANYWHERE = {"name": "anywhere", "vertex": 0, "clip": NO_CLIP}
 """Stands for targets where a solid has none yet."""
+LONGEST = 200
+"""Steps that can be undone."""
 
 
 @dataclass(frozen=True)
@@ -41,19 +43,10 @@ class Material:
 class Document:
     """A project under way.
 
-    Attributes
-    ----------
-    settings
-        Keys of a project but `targets`, as its file has them: paths from the workspace's folder.
-        Empty while there is no mesh.
-    targets
-        Struck points.
-    material
-        The present one; None is the uniform one.
-    kept
-        The other one of A and B, likewise.
-    heard
-        Which of A and B the present one is; None while no other one was kept.
+    `settings` are keys of a project but `targets`, as its file has them: paths from the workspace's
+    folder; empty while there is no mesh.  The present `material` is the uniform one if None, and
+    `kept` is the other one of A and B, likewise; `heard` tells which of the two the present one is,
+    None while no other one was kept.
     """
 
     settings: Mapping[str, Any]
@@ -69,13 +62,7 @@ class Document:
         return mesh
 
     def target(self, name: str) -> Target:
-        """The target of a name.
-
-        Raises
-        ------
-        UserError
-            If there is none.
-        """
+        """The target of a name; raises UserError if there is none."""
         for target in self.targets:
             if target.name == name:
                 return target
@@ -95,10 +82,8 @@ class Document:
     def project(self, folder: Path) -> Project:
         """The project, in a workspace's folder.
 
-        Raises
-        ------
-        UserError
-            With one sentence about the first thing that is wrong, if only that there is no clip.
+        Raises UserError with one sentence about the first thing that is wrong, if only that there
+        is no clip.
         """
         return project_of(self.described(), folder)
 
@@ -109,10 +94,7 @@ class Document:
     def require_sound(self, folder: Path) -> Document:
         """The same, if it can be a project once every target has a clip.
 
-        Raises
-        ------
-        UserError
-            With one sentence about the first thing that is wrong.
+        Raises UserError with one sentence about the first thing that is wrong.
         """
         named = [replace(target, clip=target.clip or NO_CLIP) for target in self.targets]
         targets = [_described(target) for target in named] or [_ANYWHERE]
@@ -153,18 +135,10 @@ def merged(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
     return result
 
 
-def as_json(document: Document) -> dict[str, Any]:
-    """A document as plain values, for `from_json`."""
-    return asdict(document)
-
-
 def from_json(values: Mapping[str, Any]) -> Document:
-    """The document that `as_json` gave.
+    """The document that `asdict` gave.
 
-    Raises
-    ------
-    LookupError, TypeError, ValueError
-        If it is none.
+    Raises LookupError, TypeError or ValueError if it is none.
     """
     document = document_of({**values["settings"], "targets": values["targets"]})
     material, kept = (_material(values[name]) for name in ("material", "kept"))
@@ -185,7 +159,6 @@ def _material(values: Mapping[str, Any] | None) -> Material | None:
 
 
 def _described(target: Target) -> dict[str, Any]:
-    """A target's keys, without those that have their default."""
     # The first vertex has the number 0, which equals False.
     values = {
         key: value
@@ -195,3 +168,76 @@ def _described(target: Target) -> dict[str, Any]:
     return {
         key: list(value) if isinstance(value, tuple) else value for key, value in values.items()
     }
+
+
+@dataclass
+class History:
+    """The present document, those before it and those that were undone.
+
+    `before` and `after` have names of what was done and the documents that undo and redo lead to;
+    the last one comes first.
+    """
+
+    document: Document
+    before: list[tuple[str, Document]] = field(default_factory=list)
+    after: list[tuple[str, Document]] = field(default_factory=list)
+
+    @property
+    def undo_name(self) -> str | None:
+        """What undo takes back."""
+        return self.before[-1][0] if self.before else None
+
+    @property
+    def redo_name(self) -> str | None:
+        """What redo does again."""
+        return self.after[-1][0] if self.after else None
+
+    def do(self, name: str, document: Document) -> None:
+        """Go on to another document."""
+        self.before.append((name, self.document))
+        del self.before[:-LONGEST]
+        self.after.clear()
+        self.document = document
+
+    def replace(self, document: Document) -> None:
+        """Let the present document be another one, of which undo knows nothing."""
+        self.document = document
+
+    def undo(self) -> bool:
+        """Go back by a step, if there is one."""
+        return self._move(self.before, self.after)
+
+    def redo(self) -> bool:
+        """Do again what was undone last, if anything."""
+        return self._move(self.after, self.before)
+
+    def _move(self, source: list[tuple[str, Document]], target: list[tuple[str, Document]]) -> bool:
+        if not source:
+            return False
+        name, document = source.pop()
+        target.append((name, self.document))
+        self.document = document
+        return True
+
+    def designs(self) -> set[str]:
+        """Files of all designs that one may come back to."""
+        documents = [self.document, *(each for _, each in (*self.before, *self.after))]
+        materials = [each for document in documents for each in (document.material, document.kept)]
+        return {each.design for each in materials if each is not None and each.design is not None}
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it as plain values."""
+        return {
+            "document": asdict(self.document),
+            "before": [[name, asdict(document)] for name, document in self.before],
+            "after": [[name, asdict(document)] for name, document in self.after],
+        }
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> History:
+        """What `as_json` gave; errors as those of `studio.session.document.from_json`."""
+        return cls(
+            from_json(values["document"]),
+            [(str(name), from_json(each)) for name, each in values["before"]],
+            [(str(name), from_json(each)) for name, each in values["after"]],
+        )

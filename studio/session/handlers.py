@@ -15,10 +15,9 @@ from carillon.parameters.documents import require_values
 from carillon.parameters.model import Within
 from sound.project.project import Project
 from studio.interface import NotFoundError
-from studio.session import designs
 from studio.session.document import Document, Target, merged
 from studio.session.examples import EXAMPLES
-from studio.session.projects import fit_name, opened
+from studio.session.projects import fit_name, opened, save
 from studio.session.state import StudioState
 
 Text = Annotated[str, Within(max_length=1000)]
@@ -153,7 +152,7 @@ def swap(state: StudioState) -> None:
 HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
     "open_mesh": open_mesh,
     "open_project": open_project,
-    "save": designs.save,
+    "save": save,
     "add_target": add_target,
     "change_target": change_target,
     "remove_target": remove_target,
@@ -173,11 +172,7 @@ HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
 async def handle(state: StudioState, name: str, arguments: Mapping[str, Any]) -> None:
     """Do what a page asks for.
 
-    Raises
-    ------
-    UserError
-        If there is no such call, its keys or their values are not those that the function takes
-        (see `require_call`), or what is asked for cannot be done; with one sentence.
+    Raises UserError as `require_call` does, or with one sentence if it cannot be done.
     """
     require_call(name, arguments)
     under_way = HANDLERS[name](state, **arguments)
@@ -188,10 +183,8 @@ async def handle(state: StudioState, name: str, arguments: Mapping[str, Any]) ->
 def require_call(name: str, arguments: Mapping[str, Any]) -> None:
     """Check the name of a call, and its keys against the signature of its function.
 
-    Raises
-    ------
-    UserError
-        If there is no such call, a key is missing or unknown, or a value is of another kind.
+    Raises UserError if there is no such call, a key is missing or unknown, or a value is of another
+    kind.
     """
     if name not in HANDLERS:
         raise UserError(f"there is no call {name!r:.100}; expected one of {', '.join(HANDLERS)}")
@@ -224,7 +217,6 @@ def _file(state: StudioState, clip: str | None) -> str | None:
 
 
 def _require_free(state: StudioState, vertex: int, target: str | None = None) -> None:
-    """Refuse a vertex that the surface has not, or that another target is at."""
     bench = state.solid
     count = None if bench.news is None else bench.news.vertices
     if count is None:

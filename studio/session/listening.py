@@ -32,20 +32,9 @@ _NOTHING: dict[str, Any] = {
 class Clip:
     """A clip and what is known of it.
 
-    Attributes
-    ----------
-    identifier
-        That the page names it by.
-    file
-        Its path from the workspace's folder.
-    phase
-        `waiting`, `listening`, `ready` or `failed`.
-    message
-        Why it failed.
-    found
-        Its modes, as the page gets them.
-    allow_clipped
-        Whether it may be clipped, for which it was listened to.
+    The page names it by `identifier`; `file` is its path from the workspace's folder.  Its `phase`
+    is `waiting`, `listening`, `ready` or `failed`, `message` tells why it failed, `found` are its
+    modes, as the page gets them.  It was listened to for `allow_clipped`.
     """
 
     identifier: str
@@ -59,12 +48,8 @@ class Clip:
 class Clips:
     """All clips that a studio knows, and the process that listens to them.
 
-    Parameters
-    ----------
-    path
-        Of a file of the workspace.
-    changed
-        Called when something else is known of a clip.
+    `path` leads to a file of the workspace; `changed` is called when something else is known of a
+    clip.
     """
 
     def __init__(self, path: Callable[[str], Path], changed: Callable[[], None]) -> None:
@@ -91,13 +76,7 @@ class Clips:
         return self._known[file]
 
     def named(self, identifier: str) -> Clip:
-        """The clip that the page names.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none.
-        """
+        """The clip that the page names; raises NotFoundError if there is none."""
         for clip in self._known.values():
             if clip.identifier == identifier:
                 return clip

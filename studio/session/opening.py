@@ -28,23 +28,11 @@ UNTITLED = "untitled"
 
 
 def open_studio(what: str | None, folder: Path) -> DesignStudio:
-    """A studio in a folder.
+    """A studio in a folder, which goes on with what it was left with there, if that is asked for.
 
-    It goes on with what it was left with there, if that is what is asked for.
-
-    Parameters
-    ----------
-    what
-        A project, a mesh or a design in the folder, or `builtin:NAME`; None for what it was left
-        with.
-    folder
-        The workspace.
-
-    Raises
-    ------
-    UserError
-        If it cannot be opened, another studio works in the folder, or what it was left with names
-        files outside of the folder.
+    It begins with a project, a mesh or a design in the folder, or `builtin:NAME`; with None, with
+    what it was left with.  Raises UserError if that cannot be opened, another studio works in the
+    folder, or what it was left with names files outside of the folder.
     """
     workspace = Workspace(folder)
     try:
@@ -66,7 +54,6 @@ def _goes_on(session: Mapping[str, Any], what: str | None, name: str) -> bool:
 
 
 def _go_on(studio: DesignStudio, session: Mapping[str, Any]) -> None:
-    """Go on with a session, unless nothing can be made of it."""
     file = studio.session.workspace.folder / OWN_FOLDER / SESSION
     try:
         restore(studio.session, session)
@@ -80,7 +67,6 @@ def _go_on(studio: DesignStudio, session: Mapping[str, Any]) -> None:
 
 
 def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
-    """Name and document of what is asked for."""
     if what is None:
         return UNTITLED, Document({})
     if what.startswith(BUILTIN_PREFIX):
@@ -106,7 +92,6 @@ def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether a name is one of a file at all."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # too long, or a null byte

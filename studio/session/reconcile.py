@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from carillon.errors import UserError
-from studio.session.designs import designed
 from studio.session.document import Document
+from studio.session.projects import designed
 from studio.session.state import StudioState
 
 BANK_SECONDS = 0.25
@@ -38,7 +38,6 @@ class Reconciler:
 
     @property
     def _to_show(self) -> Any:
-        """What a bank depends on."""
         state = self._state
         return (state.document.material, state.shows_fine, state.solid.aimed)
 
@@ -60,7 +59,6 @@ class Reconciler:
             await asyncio.gather(self._search_task, return_exceptions=True)
 
     async def _keep_up(self) -> None:
-        """Bring all that computes to what the document describes, again and again."""
         while True:
             await self._state.woken.wait()
             self._state.woken.clear()
@@ -133,23 +131,22 @@ class Reconciler:
         self._search_task = asyncio.ensure_future(self._search())
 
     async def _search(self) -> None:
-        """One search, from the document's material until it ends or is broken off."""
         state, document = self._state, self._state.document
-        found = None
+        result = None
         try:
             problem = await state.solid.ask("problem")
             if state.is_searching and document is state.document:
                 out = state.workspace.new_design()
-                found = await state.search.run(problem, document.material, out)
+                result = await state.search.run(problem, document.material, out)
         except UserError as error:
             state.give_up_search(str(error))
         except Exception:
             logger.exception("the search failed")
             state.give_up_search(FAULT)
         else:
-            if found is not None:
+            if result is not None:
                 state.is_searching = False
-                state.history.replace(replace(state.document, material=found))
+                state.history.replace(replace(state.document, material=result))
             elif state.is_finishing:
                 await self._finish()
         finally:
@@ -160,7 +157,6 @@ class Reconciler:
             state.woken.set()
 
     async def _finish(self) -> None:
-        """Make the design of what a search has found that was stopped: it takes a moment longer."""
         state, material = self._state, self._state.document.material
         state.changed()
         if state.is_searching or material is None or material.design is not None:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from studio.session.document import Document, Material, files_of
-from studio.session.history import History
+from studio.session.document import Document, History, Material, files_of
 from studio.session.workspace import OWN_FOLDER, OutsideError, Workspace
 
 NONSENSE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError)
 """Exceptions on reading a session that is none, or one of another version."""
 LONGEST_NAME = 255
 """Longest name of a project in characters, as long as that of a file."""
+SOON_SECONDS = 0.3
+"""Time between a change and its saving; more changes may come together."""
 
 
 def kept(history: History, workspace: Workspace) -> dict[str, Any]:
@@ -30,12 +33,8 @@ def kept(history: History, workspace: Workspace) -> dict[str, Any]:
 def restored(values: Mapping[str, Any], workspace: Workspace) -> History:
     """The history that `kept` told.
 
-    Raises
-    ------
-    OutsideError
-        If any document in it names a file outside of the workspace.
-    LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError
-        If it is none.
+    Raises OutsideError if any document in it names a file outside of the workspace, and one of
+    `NONSENSE` if it is none.
     """
     history = History.from_json(dict(values))
     sound: list[tuple[Any, Any]] = []
@@ -52,19 +51,6 @@ def restored(values: Mapping[str, Any], workspace: Workspace) -> History:
         for material in _materials(document):
             _require_finite(material)
     return _with_designs(history, lambda design: str(_found(design, workspace)))
-
-
-def restored_name(name: Any) -> str:
-    """The project's name in a session.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
-    if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME:
-        raise ValueError("the name is none")
-    return name
 
 
 def _documents(history: History) -> Iterator[Document]:
@@ -110,10 +96,7 @@ def _from_folder(design: str, workspace: Workspace) -> str:
 def _found(design: str, workspace: Workspace) -> Path:
     """Where a design is that a session names, if only by where it was before the folder was moved.
 
-    Raises
-    ------
-    OutsideError
-        If it is outside of the workspace, and there is none of its name inside.
+    Raises OutsideError if it is outside of the workspace, and there is none of its name inside.
     """
     own = Path(OWN_FOLDER, "designs", Path(design).name)
     names = [design, str(own) if Path(design).parts[-3:] == own.parts else Path(design).name]
@@ -125,3 +108,34 @@ def _found(design: str, workspace: Workspace) -> Path:
         if path.is_file() or name == design:
             return path
     raise OutsideError(f"the design {design} lies outside of the workspace {workspace.folder.name}")
+
+
+class Autosave:
+    """Writes what `session` returns by `write`, in the background."""
+
+    def __init__(
+        self, session: Callable[[], dict[str, Any]], write: Callable[[dict[str, Any]], None]
+    ) -> None:
+        self._session, self._write = session, write
+        self._due = asyncio.Event()
+        self._seconds = SOON_SECONDS
+
+    def soon(self, seconds: float = SOON_SECONDS) -> None:
+        """Save within some seconds."""
+        self._seconds = min(seconds, self._seconds) if self._due.is_set() else seconds
+        self._due.set()
+
+    def save(self) -> None:
+        """Save now; what cannot be written is told in the terminal."""
+        self._due.clear()
+        try:
+            self._write(self._session())
+        except UserError as error:
+            say(str(error))
+
+    async def run(self) -> None:
+        """Save whenever it is due."""
+        while True:
+            await self._due.wait()
+            await asyncio.sleep(self._seconds)
+            self.save()

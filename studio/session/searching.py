@@ -29,21 +29,11 @@ class Live:
 
 
 class Searching:
-    """A search at a time.
+    """A search at a time, in the phase `idle`, `starting` or `running`; `rows` are the history of
+    the present material.
 
-    Parameters
-    ----------
-    told
-        Called with every piece of news, the event `progress`.
-    found
-        Called with every better material.
-
-    Attributes
-    ----------
-    phase
-        `idle`, `starting` or `running`.
-    rows
-        History of the present material.
+    `told` is called with every piece of news, the event `progress`, and `found` with every better
+    material.
     """
 
     def __init__(
@@ -62,15 +52,8 @@ class Searching:
     async def run(self, problem: bytes, material: Material | None, out: Path) -> Material | None:
         """Search from a material until the budget is spent or it is stopped.
 
-        Returns
-        -------
-        Material or None
-            What was found, with its design in `out`; None if the search was broken off.
-
-        Raises
-        ------
-        UserError
-            If there was nothing to search from, or the process ended.
+        What was found has its design in `out`; None if the search was broken off.  Raises UserError
+        if there was nothing to search from, or the process ended.
         """
         self.phase, self._is_broken_off = "starting", False
         initial = None if material is None else material.design

@@ -10,7 +10,7 @@ from carillon.fem.geometry.builtin import BUILTINS
 from carillon.parameters.documents import with_defaults
 from sound.project.project import Project
 from studio.session.examples import EXAMPLES
-from studio.session.restoring import kept, restored, restored_name
+from studio.session.restoring import LONGEST_NAME, kept, restored
 from studio.session.state import StudioState
 
 
@@ -18,6 +18,9 @@ def state_event(state: StudioState) -> dict[str, Any]:
     """The event `state`, as docs/contributing/studio.md describes it."""
     document, news = state.document, state.solid.news
     settings = with_defaults(document.settings, Project)
+    # For the solid, or for clips.
+    is_waiting = state.is_searching and state.search.phase == "idle"
+    phase = "starting" if is_waiting else state.search.phase
     return {
         "event": "state",
         "revision": state.revision,
@@ -31,7 +34,10 @@ def state_event(state: StudioState) -> dict[str, Any]:
         "clips": state.clips.state(),
         "wanted": state.solid.wanted,
         "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
-        "search": {"phase": _search_phase(state), "message": state.message},
+        "search": {
+            "phase": phase,
+            "message": state.message,
+        },
         "fine": {"on": state.shows_fine, "phase": state.fine_phase, "message": None},
         "heard": document.heard,
         "builtins": sorted(BUILTINS),
@@ -44,12 +50,6 @@ def state_event(state: StudioState) -> dict[str, Any]:
             for number, name in enumerate(state.workspace.projects(), start=1)
         ],
     }
-
-
-def _search_phase(state: StudioState) -> str:
-    """That of the search; one that waits for the solid or for clips is starting, too."""
-    is_waiting = state.is_searching and state.search.phase == "idle"
-    return "starting" if is_waiting else state.search.phase
 
 
 def _target(state: StudioState, name: str) -> dict[str, Any]:
@@ -80,14 +80,12 @@ def session_of(state: StudioState) -> dict[str, Any]:
 def restore(state: StudioState, session: Mapping[str, Any]) -> None:
     """Let a studio go on with what `session_of` returned.
 
-    Raises
-    ------
-    OutsideError
-        If it names files outside of the workspace.
-    LookupError, TypeError, ValueError, AttributeError, ArithmeticError, UserError
-        If it is none.
+    Raises OutsideError if it names files outside of the workspace, and one of
+    `studio.session.restoring.NONSENSE` if it is none.
     """
-    name, history = restored_name(session["name"]), restored(session["history"], state.workspace)
+    name, history = session["name"], restored(session["history"], state.workspace)
+    if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME:
+        raise ValueError("the name is none")
     saved, fine = bool(session["saved"]), bool(session["fine"])
     state.is_searching = bool(session["searching"])
     state.name, state.shows_fine = name, fine

@@ -40,25 +40,10 @@ class SolidNews:
 class SolidClient:
     """The solid that a process computes with, and what is known of it.
 
-    Parameters
-    ----------
-    folder
-        That paths of documents begin at.
-    changed
-        Called when there is something else to be shown.
-
-    Attributes
-    ----------
-    news
-        What is shown of the solid; None if there is none.
-    surface
-        Its surface as a binary message, and the number of that.
-    strikes
-        Struck points, by the names of targets.
-    wanted
-        Modes that all clips share, if there are targets.
-    project
-        That the solid aims at, if there are targets.
+    Paths of documents begin at `folder`; `changed` is called when there is something else to be
+    shown.  `news` is what is shown of the solid, if there is one; `surface` has the number and the
+    binary message of its surface.  If there are targets, `strikes` are the points of these by their
+    names, `wanted` the modes that all clips share, and `project` is what the solid aims at.
     """
 
     def __init__(self, folder: Path, changed: Callable[[], None]) -> None:
@@ -98,17 +83,10 @@ class SolidClient:
         self._forget()
 
     async def bring(self, document: Document, heard: Sequence[Target]) -> None:
-        """Bring the solid to what a document describes.
+        """Bring the solid to what a document describes, with the targets whose clips were heard.
 
-        Parameters
-        ----------
-        heard
-            Targets whose clips have been listened to.
-
-        Raises
-        ------
-        UserError
-            If it cannot be.  The news then tell it, too, or the solid is there without an aim.
+        Raises UserError if it cannot be.  The news then tell it, too, or the solid is there without
+        an aim.
         """
         if document.mesh is None:
             self.end()
@@ -138,13 +116,13 @@ class SolidClient:
         self.news = SolidNews(mesh, surface_name(mesh), "reading")
         self._changed()
         self._numbers += 1
-        found = await self._worker.call("read", path, unit, self._numbers, seconds=READ_SECONDS)
-        self.surface, self._read = (self._numbers, found.message), (mesh, unit)
+        result = await self._worker.call("read", path, unit, self._numbers, seconds=READ_SECONDS)
+        self.surface, self._read = (self._numbers, result.message), (mesh, unit)
         self._tell(
             surface=self._numbers,
-            vertices=found.vertices,
-            triangles=found.triangles,
-            longest_side_m=found.longest_side_m,
+            vertices=result.vertices,
+            triangles=result.triangles,
+            longest_side_m=result.longest_side_m,
         )
 
     async def _bring_voxels(self, solid: Any, material: Any) -> None:
@@ -153,9 +131,9 @@ class SolidClient:
         self._aimed = self._placed = None
         self.project = self.wanted = None
         self._tell(phase="preparing", message=None)
-        found = await self._worker.call("prepare", solid, material, seconds=PREPARED_SECONDS)
+        result = await self._worker.call("prepare", solid, material, seconds=PREPARED_SECONDS)
         self._prepared = (solid, material)
-        self._tell(phase="ready", message=None, progress=None, **found)
+        self._tell(phase="ready", message=None, progress=None, **result)
 
     async def _bring_strikes(self, document: Document) -> None:
         if self._placed == document.targets:

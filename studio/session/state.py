@@ -8,11 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 from carillon.errors import UserError
-from studio.session.autosave import Autosave
-from studio.session.document import Document
-from studio.session.history import History
+from studio.feed import Pages
+from studio.session.document import Document, History
 from studio.session.listening import Clips
-from studio.session.pages import Pages
+from studio.session.restoring import Autosave
 from studio.session.searching import Live, Searching
 from studio.session.solid_client import SolidClient
 from studio.session.workspace import Workspace
@@ -37,26 +36,16 @@ class StudioState:
 
     Attributes
     ----------
-    workspace, name
-        The studio's folder, and the name of the project.
-    history
-        The document, with undo and redo.
-    meshes
-        Files of uploaded meshes by identifier.
-    saved
-        The document as it was saved last.
-    solid, clips, search
-        What computes.
-    shows_fine, is_searching
-        Whether the fine solid is to be shown, and whether a search is to go on.
-    fine_phase
-        Of the fine solid: `none`, `working` or `ready`.
-    message
-        Why there is no search, if there was to be one.
-    live
-        The newest material of a search that goes on.
-    is_finishing
-        Whether a design is being made of what a stopped search has found.
+    history, saved, meshes
+        The document, with undo and redo, and as it was saved last; files of uploaded meshes by
+        identifier.
+    solid, clips, search, live
+        What computes, and the newest material of a search that goes on.
+    shows_fine, fine_phase
+        Whether the fine solid is to be shown; `none`, `working` or `ready`.
+    is_searching, is_finishing, message
+        Whether a search is to go on; whether a design is being made of what a stopped search has
+        found; why there is no search, if there was to be one.
     revision
         Number of changes that pages were told.
     woken, improved
@@ -111,7 +100,6 @@ class StudioState:
         self.pages.tell({"event": "progress", **news})
 
     def _found(self, live: Live) -> None:
-        """Take up a better material of a search."""
         self.live = live
         self.history.replace(replace(self.document, material=live.material))
         self.autosave.soon(SAVED_SECONDS)

@@ -6,12 +6,11 @@ import asyncio
 from collections.abc import Mapping
 from typing import Any
 
-from studio.feed import Feed
 from studio.interface import Download, NotFoundError
 from studio.processes.worker import Worker
-from studio.session.designs import designed
 from studio.session.document import Document
 from studio.session.handlers import handle
+from studio.session.projects import designed
 from studio.session.reconcile import Reconciler
 from studio.session.snapshot import session_of, state_event
 from studio.session.state import StudioState
@@ -32,19 +31,16 @@ MEDIA_TYPES = {
 
 
 class DesignStudio:
-    """The studio in a workspace, see `studio.interface.Studio`.
-
-    Attributes
-    ----------
-    session
-        Its state.
-    reconciler
-        What follows the state.
+    """The studio in a workspace, see `studio.interface.Studio`: its state is `session`, which the
+    reconciler follows.
     """
 
     def __init__(self, workspace: Workspace, name: str, document: Document) -> None:
         self.session = StudioState(workspace, name, document, state_event, session_of)
         self.reconciler = Reconciler(self.session)
+        pages, clips = self.session.pages, self.session.clips
+        self.subscribe, self.unsubscribe = pages.subscribe, pages.unsubscribe
+        self.clip_sound, self.clip_spectrum = clips.part, clips.spectrum
         self._exports = Worker("studio.processes.exports:Exports")
         self._saving: asyncio.Future[None] | None = None
 
@@ -56,14 +52,6 @@ class DesignStudio:
     def state(self) -> dict[str, Any]:
         """The event `state`."""
         return state_event(self.session)
-
-    def subscribe(self) -> Feed:
-        """A feed that begins with all that there is."""
-        return self.session.pages.subscribe()
-
-    def unsubscribe(self, feed: Feed) -> None:
-        """Send nothing more to a feed."""
-        self.session.pages.unsubscribe(feed)
 
     async def call(self, name: str, arguments: Mapping[str, Any]) -> None:
         """Do what the page asks for."""
@@ -91,14 +79,6 @@ class DesignStudio:
         if surface is None or surface[0] != number:
             raise NotFoundError(f"there is no surface {number} any more; load the page anew")
         return surface[1]
-
-    async def clip_sound(self, clip: str, part: str) -> bytes:
-        """A clip or a part of it."""
-        return await self.session.clips.part(clip, part)
-
-    async def clip_spectrum(self, clip: str) -> dict[str, list[float]]:
-        """A clip's spectrum."""
-        return await self.session.clips.spectrum(clip)
 
     async def export(self, kind: str, target: str | None) -> Download:
         """The design in another form."""

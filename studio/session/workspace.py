@@ -86,12 +86,8 @@ class Workspace:
     def path(self, name: str) -> Path:
         """Where a file is that a project names.
 
-        Raises
-        ------
-        OutsideError
-            If that is outside of the folder, by whatever way.
-        UserError
-            If there can be no such file.
+        Raises OutsideError if that is outside of the folder, by whatever way, and UserError if
+        there can be no such file.
         """
         try:
             path = (self.folder / name).resolve()
@@ -125,16 +121,13 @@ class Workspace:
 
     def projects(self) -> list[str]:
         """Names of the projects, without ending."""
-        found = [path for path in self.folder.iterdir() if path.suffix in PROJECT_ENDINGS]
-        return sorted(path.stem for path in found if path.is_file())[:MOST_PROJECTS]
+        paths = [path for path in self.folder.iterdir() if path.suffix in PROJECT_ENDINGS]
+        return sorted(path.stem for path in paths if path.is_file())[:MOST_PROJECTS]
 
     def read_project(self, name: str) -> dict[str, Any]:
         """Keys and values of a project's file.
 
-        Raises
-        ------
-        UserError
-            If there is no such file, or it is no project.
+        Raises UserError if there is no such file, or it is no project.
         """
         for ending in PROJECT_ENDINGS:
             path = self.path(f"{name}{ending}")
@@ -145,11 +138,8 @@ class Workspace:
     def require_savable(self, name: str) -> None:
         """Check that all files of a project may be written.
 
-        Raises
-        ------
-        UserError
-            If the name is none for a project, or one of its files is a link or something else that
-            the studio does not write to.
+        Raises UserError if the name is none for a project, or one of its files is a link or
+        something else that the studio does not write to.
         """
         require_name(name)
         for file in (f"{name}.yaml", f"{name}.yaml~", f"{name}.h5"):
@@ -158,10 +148,7 @@ class Workspace:
     def write_project(self, name: str, described: Mapping[str, Any]) -> None:
         """Write a project's file; one that was edited by hand stays beside it, as NAME.yaml~.
 
-        Raises
-        ------
-        UserError
-            As `require_savable` does, or if a file cannot be written.
+        Raises UserError as `require_savable` does, or if a file cannot be written.
         """
         self.require_savable(name)
         file = f"{name}.yaml"
@@ -172,10 +159,7 @@ class Workspace:
     def write_design(self, name: str, design: Path) -> None:
         """Write a project's design, a copy of another file.
 
-        Raises
-        ------
-        UserError
-            As `require_savable` does, or if a file cannot be read or written.
+        Raises UserError as `require_savable` does, or if a file cannot be read or written.
         """
         self.require_savable(name)
         try:
@@ -195,10 +179,6 @@ class Workspace:
             return text != project_text(parse_yaml(text))
         except (UserError, UnicodeDecodeError, LookupError, TypeError, AttributeError):
             return True
-
-    def design(self, name: str) -> Path:
-        """The design that goes with a project."""
-        return self.path(f"{name}.h5")
 
     def new_design(self) -> Path:
         """A name for a design that undo may go back to, which nothing has yet."""
@@ -232,13 +212,7 @@ class Workspace:
 
 
 def require_name(name: str) -> str:
-    """A project's name that is fit for a file.
-
-    Raises
-    ------
-    UserError
-        If it is not.
-    """
+    """A project's name that is fit for a file; raises UserError if it is not."""
     if not _NAME.fullmatch(name) or len(name) > LONGEST_NAME:
         raise UserError(
             f"the name {name!r}: expected letters, digits, - and _, {LONGEST_NAME} at most"

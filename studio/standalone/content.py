@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
-from sound.design.cents import cents, rms_cents
+from sound.design.pitch import cents, rms_cents
 from sound.project.design import Design
 from sound.rendering.listening import Listening, near_weights
 from sound.rendering.solid import SoundingSolid

@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from sound.rendering.solid import struck_amplitudes
-from sound.scenes.audible.contact_damping import greatest_damping, motion_along
-from sound.scenes.audible.resting_contact import Rest
+from sound.scenes.audible.contact_damping import Rest, greatest_damping, motion_along
 from sound.scenes.audible.sustained_contact import SustainedForce
-from sound.scenes.body import Body
+from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import HertzImpact
 from sound.synthesis.driven import BLOCK, Excitation
-
-Integers = NDArray[np.int64]
 
 PLACES_AT_ONCE = 4096
 """Number of points whose motion in all modes is held in memory together."""
@@ -38,23 +35,16 @@ def excitation(
 
     Parameters
     ----------
-    number
-        Number of the body.
     motion : (V, 3, K) [kg^-1/2]
         Displacements of its surface's vertices in each mode.
-    impacts
-        Impacts that it takes part in, in the order of time.
-    forces
-        Sustained forces of the whole scene.
-    rests
-        Intervals in which the body is at rest.
+    impacts, forces, rests
+        Impacts that it takes part in, in the order of time; sustained forces of the whole scene;
+        intervals in which the body is at rest.
     count, rate : int, int [Hz]
         Number of samples, and samples per second.
-    signed : bool
-        Whether amplitudes keep their signs; else they are those of
-        `sound.rendering.solid.struck_amplitudes`.
-    damped : bool
-        Whether contacts damp the modes.
+    signed, damped : bool
+        Whether amplitudes keep their signs, else they are those of
+        `sound.rendering.solid.struck_amplitudes`; whether contacts damp the modes.
     """
     assert body.solid is not None
     modes = len(body.solid.frequencies)

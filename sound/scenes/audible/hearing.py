@@ -15,7 +15,7 @@ import numpy as np
 
 from carillon.arrays import Array
 from sound.scenes.audible.radiation import SOUND_SPEED
-from sound.scenes.picture import Motion
+from sound.scenes.performance import Motion
 
 HEAD_RADIUS = 0.0875
 """Radius [m] of an average head."""
@@ -31,16 +31,8 @@ SHADOW_LEAST, SHADOW_DEGREES = 0.1, 150.0
 
 @dataclass(frozen=True)
 class Head:
-    """A head that may move.
-
-    Attributes
-    ----------
-    times : (t,) [s]
-        Times of its positions, ascending.
-    positions : (t, 3) [m]
-        Positions of its centre.
-    facing : (3,) [m]
-        Point that the nose points to.
+    """A head that may move: at ascending `times` (t,) [s] its centre is at `positions` (t, 3) [m],
+    and its nose points to `facing` (3,) [m].
     """
 
     times: Array
@@ -65,18 +57,9 @@ def towards(motion: Motion, body: int, head: Head) -> Array:
 
 
 def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Array:
-    """Sound (s, 2) [Pa] of a body at the left and the right ear.
+    """Sound (s, 2) [Pa] of the body of a number at the left and the right ear of a head.
 
-    Parameters
-    ----------
-    source : (s,) [Pa m]
-        Pressure times distance, in the direction of the head.
-    motion, body
-        Motion of all bodies, and number of this one.
-    head
-        The head.
-    rate : int [Hz]
-        Samples per second.
+    The source (s,) [Pa m] is pressure times distance, in the direction of the head, at a rate [Hz].
     """
     times = motion.times
     places, right = head.at(times)

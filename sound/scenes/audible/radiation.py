@@ -22,12 +22,9 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.arrays import Array
-from sound.scenes.shape import Shape
-
-Waves = NDArray[np.complex128]
+from carillon.arrays import Array, Complex
+from sound.scenes.bodies import Shape
 
 AIR_DENSITY = 1.204
 """Density [kg/m^3] of air at 20 C."""
@@ -54,17 +51,11 @@ ROUNDING = 1e-9
 class Radiation:
     """Pressure that N modes radiate, far away.
 
-    A mode whose coordinate moves at a velocity of the amplitude 1 kg^1/2 m/s, which is what
-    u_k^T f = 1 kg^-1/2 N s does to it, is heard at the distance r [m] in the direction n (unit
-    vector) with the pressure amplitude (monopole + dipole . n) / r.  So these are factors of the
-    amplitudes that `sound.rendering.solid.SoundingSolid.amplitudes` gives.
-
-    Attributes
-    ----------
-    monopoles : (N,) [Pa m / (kg^-1/2 N s)]
-        What is heard in all directions.
-    dipoles : (N, 3) [Pa m / (kg^-1/2 N s)]
-        What is heard along an axis, in the axes of the solid.
+    A mode whose coordinate moves at a velocity of the amplitude 1 kg^1/2 m/s, which is what u_k^T f
+    = 1 kg^-1/2 N s does to it, is heard at the distance r [m] in the direction n (unit vector) with
+    the pressure amplitude (monopole + dipole . n) / r.  So `monopoles` (N,) and `dipoles` (N, 3),
+    in the axes of the solid [Pa m / (kg^-1/2 N s)], are factors of the amplitudes that
+    `sound.rendering.solid.SoundingSolid.amplitudes` gives.
     """
 
     monopoles: Array
@@ -73,18 +64,9 @@ class Radiation:
 
 @dataclass(frozen=True)
 class _Panels:
-    """Triangles that move.
-
-    Attributes
-    ----------
-    centres : (F, 3) [m]
-        From the solid's centre of mass.
-    normals : (F, 3)
-        Outward unit vectors.
-    flows : (F, N) [m^2 kg^-1/2]
-        Normal displacement in each mode times area.
-    radius : float [m]
-        Of the sphere with as large a surface.
+    """Triangles that move: centres (F, 3) [m] from the solid's centre of mass, outward unit normals
+    (F, 3), flows (F, N) [m^2 kg^-1/2], the normal displacement in each mode times area, and the
+    radius [m] of the sphere with as large a surface.
     """
 
     centres: Array
@@ -96,14 +78,9 @@ class _Panels:
 def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation:
     """Sound radiated by the modes of a solid, approximately; see this module.
 
-    Parameters
-    ----------
-    solid_motion : (V, 3, N) [kg^-1/2]
-        Displacement of the vertices in each mass-normalised mode.
-    shape
-        The surface, from the centre of mass.  Its triangles may face either way; it may be open.
-    frequencies : (N,) [Hz]
-        Above 0.
+    `solid_motion` (V, 3, N) [kg^-1/2] are the displacements of the vertices in each mass-normalised
+    mode, of frequencies (N,) [Hz] above 0.  The triangles of the surface, which is given from the
+    centre of mass, may face either way; it may be open.
 
     Notes
     -----
@@ -152,7 +129,7 @@ def _panels(motion: Array, shape: Shape) -> _Panels:
     return _Panels(corners[there].mean(axis=1), normals, flows, radius)
 
 
-def _hankel(x: Array) -> tuple[Waves, Waves]:
+def _hankel(x: Array) -> tuple[Complex, Complex]:
     """Spherical Hankel functions (3, N) of the first kind, orders 0 to 2, and their derivatives."""
     from scipy.special import spherical_jn, spherical_yn
 
@@ -166,24 +143,18 @@ def _hankel(x: Array) -> tuple[Waves, Waves]:
 
 @dataclass(frozen=True)
 class _LowOrders:
-    """Integrals over the surface of v J_l and v dJ_l/dn, of orders 0 and 1.
+    """Integrals over the surface of v J_l [m^2 kg^-1/2] and v dJ_l/dn [m kg^-1/2], of orders 0 (N,)
+    and 1 (N, 3).
 
     J_0 = j_0(kr), and J_1 = -3i j_1(kr) x/|x|, to be multiplied by the direction d.
-
-    Attributes
-    ----------
-    plain, plain_slope : (N,) [m^2 kg^-1/2], [m kg^-1/2]
-        Of order 0.
-    turned, turned_slope : (N, 3) [m^2 kg^-1/2], [m kg^-1/2]
-        Of order 1.
     """
 
     plain: Array
     plain_slope: Array
-    turned: Waves
-    turned_slope: Waves
+    turned: Complex
+    turned_slope: Complex
 
-    def scattered(self, first: Waves, second: Waves) -> tuple[Waves, Waves]:
+    def scattered(self, first: Complex, second: Complex) -> tuple[Complex, Complex]:
         """Integrals (N,), (N, 3) of v (J_l + z_l dJ_l/dn), by z_0 and z_1 (N,) [m]."""
         return (
             self.plain + first * self.plain_slope,
@@ -209,16 +180,12 @@ def _low_orders(panels: _Panels, numbers: Array) -> _LowOrders:
 
 
 def _power_above(
-    panels: _Panels, numbers: Array, scatter: Waves, plain: Waves, turned: Waves
+    panels: _Panels, numbers: Array, scatter: Complex, plain: Complex, turned: Complex
 ) -> Array:
     """Mean (N,) [m^4 kg^-1] over directions of |integral|^2, orders 0 and 1 taken off.
 
-    Parameters
-    ----------
-    scatter : (N,) [m]
-        z of all orders.
-    plain, turned : (N,), (N, 3)
-        Orders 0 and 1 with the same z.
+    `scatter` (N,) [m] is z of all orders; `plain` (N,) and `turned` (N, 3) are orders 0 and 1 with
+    it.
     """
     directions = _half_of_all_directions(DIRECTION_PAIRS)
     ways, facings = directions @ panels.centres.T, directions @ panels.normals.T
@@ -234,12 +201,8 @@ def _power_above(
 def _waves(ways, facings, numbers, flows):  # type: ignore[no-untyped-def]
     """Sums (4, d, N) over F panels of flows (F, N) times cosine and sine of k way, then so facing.
 
-    Parameters
-    ----------
-    ways, facings : (d, F) [m], (d, F)
-        How far the panels lie, and how much they face, in d directions.
-    numbers : (N,) [1/m]
-        k.
+    `ways` (d, F) [m] and `facings` (d, F) tell how far the panels lie, and how much they face, in d
+    directions; `numbers` (N,) [1/m] are k.
     """
     sums = np.zeros((4, len(ways), len(numbers)))
     for d in range(len(ways)):
@@ -261,7 +224,7 @@ def _waves(ways, facings, numbers, flows):  # type: ignore[no-untyped-def]
     return sums
 
 
-def _main_axis(turned: Waves, towards: Waves) -> tuple[Array, Array]:
+def _main_axis(turned: Complex, towards: Complex) -> tuple[Array, Array]:
     """Dipoles (N, 3) along one axis each, and their parts a quarter of a period later.
 
     The ellipse that a complex dipole runs through is cut into its two half axes.  The first one is

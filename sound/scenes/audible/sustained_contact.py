@@ -1,25 +1,36 @@
-"""Sustained forces between bodies: their fluctuation by rough surfaces, and their dashpots."""
+"""Sustained forces between bodies: their fluctuation by rough surfaces, and their dashpots.
+
+The profile of a surface along the way of a rolling or sliding contact is a sum of octaves of smooth
+random waves, whose heights fall with the wavelength as those of a self-affine surface (B. Persson,
+Surface Science Reports 61, 2006).  Waves shorter than the patch of contact are left out.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from sound.scenes.audible.contact_damping import dashpot
-from sound.scenes.audible.roughness import profile
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.contact.impacts import SustainedContact
 from sound.scenes.hertz import patch_radius, stiffness
 from sound.synthesis.driven import BLOCK
 
-Integers = NDArray[np.int64]
-
 LOWEST_HERTZ = 20.0
 """Frequency [Hz] below which fluctuations of a force are filtered out, as they are not heard."""
+LONGEST_WAVE = 5e-3
+"""Greatest wavelength [m] of roughness; longer ones belong to the shape of the surface."""
+OCTAVES = 10
+"""Number of octaves of wavelengths."""
+HURST = 0.8
+"""Hurst exponent: heights of waves go as the wavelength to this power."""
+_LATTICE_RMS = 0.49
+"""Root mean square height of the waves of one octave of unit height; a test measures it."""
 
 
 @dataclass(frozen=True)
@@ -33,25 +44,20 @@ class SustainedForce:
     contacts, vertices, shares
         Points of contact in the order of time, nearest vertices of both bodies, and sustained
         shares of the forces.
-    blocks : (b,)
-        Numbers of the blocks with a force, ascending.
-    firsts : (b,)
-        Number of the first point in each block.
-    steps : (b,)
-        Number of the engine's steps with a force in each block.
-    courses : (b, BLOCK)
-        Fluctuation of the force over its mean.
-    dashpots : (b,) [N s/m]
-        Dashpot of the contact in each block.
+    blocks, firsts, steps : (b,)
+        Numbers of the blocks with a force, ascending; in each, number of the first point, and
+        number of the engine's steps with a force.
+    courses, dashpots : (b, BLOCK), (b,) [N s/m]
+        Fluctuation of the force over its mean, and dashpot of the contact.
     """
 
     pair: tuple[int, int]
     contacts: ContactPoints
     vertices: NDArray[np.integer]
     shares: Array
-    blocks: Integers
-    firsts: Integers
-    steps: Integers
+    blocks: Index
+    firsts: Index
+    steps: Index
     courses: Array
     dashpots: Array
 
@@ -72,20 +78,9 @@ def sustained_force(
     """The sustained force of a pair of bodies; None if there is none.
 
     A bump of the height h presses the bodies together by another h, which changes their force by h
-    times the stiffness of the contact, at most by all of it.
-
-    Parameters
-    ----------
-    contact
-        Contacts of the pair.
-    roughness : float [m]
-        Root mean square height of both surfaces together.
-    seconds, step_seconds : float [s]
-        Duration of the scene, and of a step of the simulation.
-    rate : int [Hz]
-        Samples per second.
-    seed : int
-        Seed of the scene's random surfaces.
+    times the stiffness of the contact, at most by all of it.  The roughness [m] is that of both
+    surfaces together, at random by the seed.  The scene lasts so many seconds, and a step of the
+    simulation `step_seconds`; the rate is in Hz.
     """
     times = contact.contacts.steps * step_seconds
     chosen = np.flatnonzero((contact.shares > 0.0) & (times < seconds))
@@ -105,12 +100,16 @@ def sustained_force(
     pace = np.linalg.norm(sliding, axis=1) + radius * contacts.turning
     speeds = np.add.reduceat(pace, firsts) / points
     springs = stiffness(forces, radius, modulus)
+    words = np.random.SeedSequence([seed, *(each + 1 for each in contact.pair)])
+    # Distances at the end of each block, less those from each of its samples on.
+    ahead = (np.arange(BLOCK) + 1.0) / BLOCK - 1.0
+    way = (np.cumsum(speeds) * BLOCK / rate)[:, None] + (speeds * BLOCK / rate)[:, None] * ahead
     heights = profile(
-        _way(np.cumsum(speeds) * BLOCK / rate, speeds * BLOCK / rate),
+        way.ravel(),
         np.repeat(speeds, BLOCK),
         np.repeat(2.0 * patch_radius(forces, radius, modulus), BLOCK),
         roughness,
-        _seed(seed, contact.pair),
+        int(words.generate_state(1, np.uint64)[0]),
         rate,
     )
     fluctuation = np.clip(heights * np.repeat(springs / forces, BLOCK), -1.0, 1.0)
@@ -123,12 +122,49 @@ def sustained_force(
     )
 
 
-def _way(ends: Array, steps: Array) -> Array:
-    """Distances (b * BLOCK,) covered at each sample, by those at the end and within each block."""
-    shares = (np.arange(BLOCK) + 1.0) / BLOCK - 1.0
-    return np.asarray((ends[:, None] + steps[:, None] * shares).ravel())
+def octave_heights(rms: float) -> Array:
+    """Root mean square heights (o,) [m] of the octaves, longest first, of a roughness [m]."""
+    heights = 2.0 ** (-HURST * np.arange(OCTAVES))
+    return np.asarray(rms * heights / np.linalg.norm(heights))
 
 
-def _seed(seed: int, pair: tuple[int, int]) -> int:
-    words = np.random.SeedSequence([seed, pair[0] + 1, pair[1] + 1]).generate_state(1, np.uint64)
-    return int(words[0])
+def profile(way: Array, speeds: Array, patches: Array, rms: float, seed: int, rate: int) -> Array:
+    """Heights (s,) [m] of a surface of the roughness `rms` [m] under a contact that has covered a
+    way (s,) [m].
+
+    Waves are left out that are passed faster than half the sampling rate [Hz], by the speeds (s,)
+    [m/s], and those shorter than the patch of contact, by its diameters (s,) [m].
+    """
+    heights = octave_heights(rms) / _LATTICE_RMS
+    return np.asarray(_profile(way, speeds, patches, heights, np.uint64(seed), float(rate)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _profile(way, speeds, patches, heights, seed, rate):  # type: ignore[no-untyped-def]
+    felt = np.zeros(len(way))
+    for n in range(len(way)):
+        wave = LONGEST_WAVE
+        for octave in range(len(heights)):
+            if wave < 2.0 * patches[n] or 2.0 * speeds[n] > wave * rate:
+                break
+            place = 2.0 * way[n] / wave
+            cell = np.floor(place)
+            share = place - cell
+            smooth = share * share * (3.0 - 2.0 * share)
+            number = np.int64(cell)
+            low = _hashed(number, octave, seed)
+            high = _hashed(number + 1, octave, seed)
+            felt[n] += heights[octave] * (low + smooth * (high - low))
+            wave *= 0.5
+    return felt
+
+
+@numba.njit(cache=True, nogil=True)
+def _hashed(cell, octave, seed):  # type: ignore[no-untyped-def]
+    """A pseudorandom number from -1 to 1 by cell, octave and seed (splitmix64)."""
+    x = np.uint64(cell) * np.uint64(0x9E3779B97F4A7C15) + seed
+    x += np.uint64(octave) * np.uint64(0xD1B54A32D192ED03)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    x = x ^ (x >> np.uint64(31))
+    return np.float64(x >> np.uint64(11)) * 2.0**-52 - 1.0

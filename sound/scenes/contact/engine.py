@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from carillon.arrays import Array
 from carillon.command_line.logs import warn_once
 from carillon.command_line.progress import track
 from carillon.errors import UserError, one_line
-from sound.scenes.body import Body
-from sound.scenes.contact.bounce import damping_ratio
-from sound.scenes.contact.contact_log import ContactLog
-from sound.scenes.contact.contacts import ContactPoints
+from sound.scenes.bodies import Body
+from sound.scenes.contact.contacts import ContactLog, ContactPoints
 from sound.scenes.contact.start import start
 from sound.scenes.materials import NamedMaterial
 from sound.scenes.packages import scene_package
-from sound.scenes.picture import Motion
+from sound.scenes.performance import Motion
 from sound.scenes.scene import EngineEntry, Vector
 
 PICTURES_PER_SECOND = 120
@@ -39,6 +39,10 @@ MOST_KEPT = 12_000_000
 """Greatest number of contact points in a whole scene; they take 3 GB."""
 _IMPEDANCE = [0.999, 0.999, 0.001, 0.5, 2.0]
 """MuJoCo's `solimp` of every contact: a constraint that hardly yields beyond its spring."""
+PHASES = 16
+"""Number of moments within a step at which a bounce may begin; their bounces are averaged."""
+MOST_DAMPED = 1.5
+"""Greatest damping ratio that the engine's steps resolve."""
 
 
 class GroundPlane(NamedTuple):
@@ -50,19 +54,11 @@ class GroundPlane(NamedTuple):
 
 @dataclass(frozen=True)
 class Course:
-    """The motion of all bodies, and their contacts.
+    """The motion of all bodies, and their points of contact in the order of time.
 
-    Attributes
-    ----------
-    motion
-        Poses of all bodies.
-    contacts
-        Points of contact in the order of time.
-    resting : (T, B)
-        Whether each body slept, at the times of the motion.
-    moved : dict
-        Displacements (3,) [m] by which overlapping bodies were separated before the start, by the
-        numbers of the bodies.
+    `resting` (T, B) tells whether each body slept, at the times of the motion; `moved` the
+    displacements (3,) [m] by which overlapping bodies were separated before the start, by the
+    numbers of the bodies.
     """
 
     motion: Motion
@@ -79,37 +75,18 @@ def simulate(
     ground: GroundPlane,
     visible: bool = True,
 ) -> Course:
-    """Simulate the motion of bodies.
+    """Simulate the motion of bodies for some seconds under gravity (3,) [m/s^2].
 
     Bodies that overlap a little at the start are separated, see `sound.scenes.contact.start`.
     Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the masses,
-    and leaves the share of speed that the restitution says.  Bodies that lie still sleep.
-
-    Parameters
-    ----------
-    bodies
-        All bodies of the scene.
-    seconds : float [s]
-        Duration.
-    engine
-        Stiffness of the contacts, and steps.
-    gravity : (3,) [m/s^2]
-        Acceleration of a free body.
-    ground
-        The ground, if there is one.
-    visible : bool
-        Whether progress is shown on a terminal.
-
-    Raises
-    ------
-    UserError
-        If two bodies overlap much at the start, the simulation is unstable, or there are too many
-        contacts.
+    and leaves the share of speed that the restitution says.  Bodies that lie still sleep.  Raises
+    UserError if two bodies overlap much at the start, the simulation is unstable, or there are too
+    many contacts.
     """
     mujoco = loaded()
     model = _model(mujoco, bodies, engine, gravity, ground)
     data = mujoco.MjData(model)
-    moved = start(mujoco, model, data, bodies, gravity, engine.contact_seconds)
+    moved = start(data, bodies, gravity, engine.contact_seconds)
     recorder = _Recorder(model, data, bodies)
     every = max(1, round(1.0 / (PICTURES_PER_SECOND * engine.step_seconds)))
     steps = every * int(np.ceil(seconds / (every * engine.step_seconds)))
@@ -142,7 +119,6 @@ def _model(
     gravity: Vector,
     ground: GroundPlane,
 ) -> Any:
-    """MuJoCo's model of bodies and ground."""
     spec = mujoco.MjSpec()
     spec.option.timestep = engine.step_seconds
     spec.option.gravity = gravity
@@ -193,7 +169,6 @@ def _add_body(mujoco: ModuleType, spec: Any, engine: EngineEntry, number: int, b
 
 
 def _contact_options(engine: EngineEntry, friction: float, restitution: float) -> dict[str, Any]:
-    """MuJoCo's options of the contacts of a surface."""
     stiff = (np.pi / engine.contact_seconds) ** 2
     ratio = damping_ratio(restitution, engine.steps)
     return {
@@ -205,8 +180,6 @@ def _contact_options(engine: EngineEntry, friction: float, restitution: float) -
 
 
 class _Recorder:
-    """Records poses and contacts."""
-
     def __init__(self, model: Any, data: Any, bodies: list[Body]) -> None:
         self.model, self.data, self.bodies = model, data, bodies
         self.owners = np.asarray(model.geom_bodyid, dtype=np.int64) - 1
@@ -269,3 +242,38 @@ class _Recorder:
         times = seconds * np.arange(len(self.positions))
         motion = Motion(times, np.array(self.positions), np.array(self.rotations))
         return Course(motion, self.log.contacts(), np.array(self.resting), moved)
+
+
+@cache
+def damping_ratio(restitution: float, steps: int) -> float:
+    """Damping ratio of a spring and damper that push but never pull.
+
+    The restitution is the speed after a bounce over that before it; `steps` is the number of the
+    engine's steps in half a period of the spring.
+
+    Examples
+    --------
+    >>> ratio = damping_ratio(0.5, 16)
+    >>> bool(abs(restitution_of(ratio, 16) - 0.5) < 1e-9)
+    True
+    """
+    if restitution >= restitution_of(0.0, steps):
+        return 0.0
+    if restitution <= restitution_of(MOST_DAMPED, steps):
+        return MOST_DAMPED
+    ratio = brentq(lambda each: restitution_of(each, steps) - restitution, 0.0, MOST_DAMPED)
+    return float(ratio)
+
+
+def restitution_of(ratio: float, steps: int) -> float:
+    """Speed after a bounce over the speed before it, by the engine's own steps."""
+    omega = np.pi / steps
+    away = -(np.arange(PHASES) + 0.5) / PHASES
+    speed = np.full(PHASES, -1.0)
+    touching = np.ones(PHASES, dtype=bool)
+    while touching.any():
+        push = np.maximum(-(omega**2) * away - 2.0 * ratio * omega * speed, 0.0)
+        touching &= (away < 0.0) & ((speed < 0.0) | (push > 0.0))
+        speed = np.where(touching, speed + push, speed)
+        away = np.where(touching, away + speed, away)
+    return float(speed.mean())

@@ -9,17 +9,21 @@ impact sounds.  The rest of the force is sustained contact: resting, rolling and
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, grey_opening
 from scipy.signal import find_peaks, peak_prominences
+from scipy.spatial import cKDTree
 
 from carillon.arrays import Array, Integers
+from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactPoints
-from sound.scenes.contact.touch import Spots, Touch
-from sound.scenes.hertz import bounce_seconds
-from sound.scenes.performance import Impact
+from sound.scenes.hertz import bounce_seconds, compliance
+from sound.scenes.materials import NamedMaterial
+from sound.scenes.performance import GROUND, Impact
 from sound.scenes.scene import EngineEntry, Vector
 
 LASTING = 2.5
@@ -40,18 +44,49 @@ LONGEST = 0.02
 _TINY = 1e-30
 
 
+class Spots(NamedTuple):
+    """Two surfaces at c points of contact.
+
+    `vertices` (c, 2) are the nearest ones of each surface, `GROUND` for the ground; `curvatures`
+    (c,) [1/m] are 1 / R, `compliances` (c,) [1/Pa] 1 / E of the effective radius and modulus, see
+    `sound.scenes.hertz`.
+    """
+
+    vertices: NDArray[np.integer]
+    curvatures: Array
+    compliances: Array
+
+
+class Touch:
+    """The surfaces of all bodies and of the ground, which is flat, searched by position."""
+
+    def __init__(self, bodies: list[Body], ground: NamedMaterial) -> None:
+        self._bodies = bodies
+        self._ground = float(compliance(ground.young, ground.poisson))
+        shapes = {id(body.shape): body.shape for body in bodies}
+        trees = {key: cKDTree(shape.vertices) for key, shape in shapes.items()}
+        self._trees = [trees[id(body.shape)] for body in bodies]
+
+    def spots(self, pair: tuple[int, int], contacts: ContactPoints) -> Spots:
+        """The surfaces of a pair of bodies at their points of contact."""
+        vertices = np.full((len(contacts), 2), GROUND)
+        curvatures, compliances = np.zeros(len(contacts)), np.zeros(len(contacts))
+        for side, number in enumerate(pair):
+            if number == GROUND:
+                compliances += self._ground
+                continue
+            body = self._bodies[number]
+            near = self._trees[number].query(contacts.places[:, side])[1]
+            vertices[:, side] = near
+            curvatures += 1.0 / body.shape.radii[near]
+            compliances += body.compliance[near]
+        return Spots(vertices, curvatures, compliances)
+
+
 @dataclass(frozen=True)
 class HertzImpact:
-    """An impact, with the impulses at all points where both bodies touch.
-
-    Attributes
-    ----------
-    impact
-        The whole impact.
-    places : (p, 2, 3) [m]
-        Points of contact, in the own axes of each of the two bodies.
-    impulses : (p, 2, 3) [N s]
-        Impulses on the two bodies there, in the same axes.
+    """An impact, with impulses (p, 2, 3) [N s] on the two bodies at the places (p, 2, 3) [m] where
+    they touch, each in the body's own axes.
     """
 
     impact: Impact
@@ -61,18 +96,8 @@ class HertzImpact:
 
 @dataclass(frozen=True)
 class SustainedContact:
-    """All contacts of two bodies, and the sustained part of their forces.
-
-    Attributes
-    ----------
-    pair : (2,)
-        Numbers of the bodies.
-    contacts
-        Points of contact in the order of time.
-    spots
-        The two surfaces at these points.
-    shares : (c,)
-        Sustained share of the force at each point.
+    """All contacts of a pair of bodies in the order of time, the two surfaces at these points
+    (`spots`), and the sustained `shares` (c,) of their forces.
     """
 
     pair: tuple[int, int]
@@ -145,12 +170,8 @@ def _impacts(
 ) -> list[Impact | None]:
     """The impacts of groups of contacts; None for a group slower than `slowest` [m/s].
 
-    Parameters
-    ----------
-    owners : (c,)
-        Number of each contact's group, ascending.
-    weights : (c,) [s]
-        Impulse of each contact over its force.
+    `owners` (c,) are ascending numbers of each contact's group, `weights` (c,) [s] its impulse over
+    its force.
     """
     firsts = np.flatnonzero(np.diff(owners, prepend=-1))
 

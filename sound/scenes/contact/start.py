@@ -8,7 +8,6 @@ itself.  Depths are those of the convex parts, which may stand out of the visibl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +15,9 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
-from sound.scenes.body import Body
+from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import SLOWEST
+from sound.scenes.packages import scene_package
 from sound.scenes.performance import GROUND
 from sound.scenes.scene import Vector
 
@@ -36,16 +36,9 @@ NAMED = 3
 
 
 class Overlap(NamedTuple):
-    """Two overlapping bodies.
+    """A pair of overlapping bodies, by numbers; the ground, `GROUND`, is always the second one.
 
-    Attributes
-    ----------
-    pair : (2,)
-        Numbers of the bodies; the ground, `GROUND`, is always the second one.
-    depth : float [m]
-        Distance by which the first body has to move to be clear.
-    normal : (3,)
-        Unit vector in which it has to move.
+    The first has to move by `depth` [m] along the unit vector `normal` (3,) to be clear.
     """
 
     pair: tuple[int, int]
@@ -54,39 +47,31 @@ class Overlap(NamedTuple):
 
 
 def start(
-    mujoco: ModuleType,
-    model: Any,
-    data: Any,
-    bodies: Sequence[Body],
-    gravity: Vector,
-    contact_seconds: float,
+    data: Any, bodies: Sequence[Body], gravity: Vector, contact_seconds: float
 ) -> dict[int, Array]:
-    """Set velocities, and separate bodies that overlap a little.
+    """Set velocities, and separate bodies that overlap a little; displacements (3,) [m] by their
+    numbers.
 
-    Returns
-    -------
-    dict
-        Displacements (3,) [m] of the bodies that were moved, by their numbers.
-
-    Raises
-    ------
-    UserError
-        If two bodies overlap by more than `OVERLAP`; the message names a position at which they
-        would not.  Or if there is no room to separate bodies.
+    Raises UserError if two bodies overlap by more than `OVERLAP`, with a position at which they
+    would not, or if there is no room to separate bodies.
     """
-    mujoco.mj_forward(model, data)
-    _set_velocities(model, data, bodies)
-    moved = _separated(mujoco, model, data, bodies, gravity, contact_seconds)
-    mujoco.mj_forward(model, data)
+    _forward(data)
+    _set_velocities(data, bodies)
+    moved = _separated(data, bodies, gravity, contact_seconds)
+    _forward(data)
     if moved:
         say(_in_words(moved, data, bodies))
     return moved
 
 
-def _set_velocities(model: Any, data: Any, bodies: Sequence[Body]) -> None:
-    """Set the velocities of all free bodies; spins are about the axes of the scene."""
+def _forward(data: Any) -> None:
+    """Bring contacts and poses to the positions."""
+    scene_package("mujoco").mj_forward(data.model, data)
+
+
+def _set_velocities(data: Any, bodies: Sequence[Body]) -> None:
     for number, body in enumerate(bodies):
-        first = model.body_dofadr[number + 1]
+        first = data.model.body_dofadr[number + 1]
         if first >= 0:
             turned = data.xmat[number + 1].reshape(3, 3)
             data.qvel[first : first + 3] = body.entry.velocity
@@ -94,31 +79,25 @@ def _set_velocities(model: Any, data: Any, bodies: Sequence[Body]) -> None:
 
 
 def _separated(
-    mujoco: ModuleType,
-    model: Any,
-    data: Any,
-    bodies: Sequence[Body],
-    gravity: Vector,
-    contact_seconds: float,
+    data: Any, bodies: Sequence[Body], gravity: Vector, contact_seconds: float
 ) -> dict[int, Array]:
-    """Displacements (3,) [m] of the bodies that had to be moved, by their numbers."""
     moved: dict[int, Array] = {}
     # Depth that is left: that of a body at rest under gravity, or of an impact that is not heard.
     bounce = contact_seconds / np.pi
     least = max(float(np.linalg.norm(gravity)) * bounce, SLOWEST) * bounce
     for _ in range(ROUNDS):
-        overlaps = [each for each in _overlaps(model, data) if each.depth > least]
+        overlaps = [each for each in _overlaps(data) if each.depth > least]
         if not overlaps:
             return moved
         if not moved:
             least *= CLEAR
-            _require_shallow(mujoco, model, data, overlaps, bodies, least)
+            _require_shallow(data, overlaps, bodies, least)
         for each in overlaps:
             for number, way in zip(each.pair, _ways(each, gravity, bodies)):
                 if way.any():
                     moved[number] = moved.get(number, np.zeros(3)) + way
-                    _move(model, data, number, way)
-        mujoco.mj_forward(model, data)
+                    _move(data, number, way)
+        _forward(data)
     names = " and ".join(_name(number, bodies) for number in overlaps[0].pair)
     raise UserError(
         f"{names} overlap by {1e3 * overlaps[0].depth:.3g} mm at the start and are too closely "
@@ -126,9 +105,9 @@ def _separated(
     )
 
 
-def _overlaps(model: Any, data: Any) -> list[Overlap]:
+def _overlaps(data: Any) -> list[Overlap]:
     """The deepest overlap of each pair, in the order of their numbers."""
-    owners = np.asarray(model.geom_bodyid, dtype=np.int64) - 1
+    owners = np.asarray(data.model.geom_bodyid, dtype=np.int64) - 1
     deepest: dict[tuple[int, int], Overlap] = {}
     contact = data.contact
     for depth, geoms, frame in zip(
@@ -143,18 +122,11 @@ def _overlaps(model: Any, data: Any) -> list[Overlap]:
 
 
 def _require_shallow(
-    mujoco: ModuleType,
-    model: Any,
-    data: Any,
-    overlaps: Sequence[Overlap],
-    bodies: Sequence[Body],
-    least: float,
+    data: Any, overlaps: Sequence[Overlap], bodies: Sequence[Body], least: float
 ) -> None:
-    """Refuse overlaps deeper than `OVERLAP`."""
-
     def excess(each: Overlap) -> float:
-        sides = [_longest_side(bodies[number]) for number in each.pair if number != GROUND]
-        return each.depth / (OVERLAP * min(sides))
+        shapes = [bodies[number].shape.vertices for number in each.pair if number != GROUND]
+        return each.depth / (OVERLAP * min(float(np.ptp(x, axis=0).max()) for x in shapes))
 
     worst = max(overlaps, key=excess)
     if excess(worst) <= 1.0:
@@ -164,7 +136,7 @@ def _require_shallow(
     first, second = worst.pair
     free = second if bodies[first].entry.fixed else first
     begin = data.xpos[free + 1].copy()
-    place = _clear_place(mujoco, model, data, worst.pair, free, least)
+    place = _clear_place(data, worst.pair, free, least)
     if place is None:
         raise UserError(f"{start}; move them apart")
     # Rounded away from the other body, so that the rounded position is clear, too.
@@ -176,27 +148,25 @@ def _require_shallow(
     )
 
 
-def _clear_place(
-    mujoco: ModuleType, model: Any, data: Any, pair: tuple[int, int], free: int, least: float
-) -> Array | None:
+def _clear_place(data: Any, pair: tuple[int, int], free: int, least: float) -> Array | None:
     """Position (3,) [m] at which body `free` of a pair, moved alone, is clear of the other one."""
     side = 1.0 if free == pair[0] else -1.0
     for _ in range(ROUNDS):
-        overlap = next((each for each in _overlaps(model, data) if each.pair == pair), None)
+        overlap = next((each for each in _overlaps(data) if each.pair == pair), None)
         if overlap is None or overlap.depth <= least:
             return np.array(data.xpos[free + 1])
-        _move(model, data, free, side * overlap.depth * overlap.normal)
-        mujoco.mj_forward(model, data)
+        _move(data, free, side * overlap.depth * overlap.normal)
+        _forward(data)
     return None
 
 
-def _move(model: Any, data: Any, number: int, way: Array) -> None:
+def _move(data: Any, number: int, way: Array) -> None:
+    model = data.model
     first = model.jnt_qposadr[model.body_jntadr[number + 1]]
     data.qpos[first : first + 3] += way
 
 
 def _ways(each: Overlap, gravity: Vector, bodies: Sequence[Body]) -> tuple[Array, Array]:
-    """Displacements (3,) [m] of both bodies."""
     apart = each.depth * each.normal
     fixed = [number == GROUND or bodies[number].entry.fixed for number in each.pair]
     down = np.array(gravity)
@@ -206,10 +176,6 @@ def _ways(each: Overlap, gravity: Vector, bodies: Sequence[Body]) -> tuple[Array
     if fixed[0] or steepness < -STEEP:
         return np.zeros(3), -apart
     return 0.5 * apart, -0.5 * apart
-
-
-def _longest_side(body: Body) -> float:
-    return float(np.ptp(body.shape.vertices, axis=0).max())
 
 
 def _name(number: int, bodies: Sequence[Body]) -> str:

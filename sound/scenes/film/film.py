@@ -83,22 +83,9 @@ def write_film(
     """Write the video of a scene: H.264 and AAC in `.mp4`, VP9 and Opus in `.webm`.
 
     Frame n shows the time n / `frames_per_second`; the last one lasts at least until the sound
-    ends.  The same performance gives the same bytes.
-
-    Parameters
-    ----------
-    performance
-        Picture and sound.
-    frames_per_second : int [1/s]
-        Frame rate.
-    size
-        Width and height [pixels], even numbers.
-
-    Raises
-    ------
-    UserError
-        If the name has another ending, the file cannot be written, the size is odd or a package is
-        missing.
+    ends.  Width and height [pixels] are even numbers.  The same performance gives the same bytes.
+    Raises UserError if the name has another ending, the file cannot be written, the size is odd or
+    a package is missing.
     """
     path = require_output(path, FORMATS)
     _require_frames(frames_per_second, size)
@@ -139,7 +126,6 @@ def _picture_stream(
 
 
 def _sound_stream(container: OutputContainer, form: FilmFormat, rate: int) -> AudioStream:
-    """A stereo stream at the sound's own sampling rate, if the codec supports it."""
     codec = scene_package("av").codec.Codec(form.sound, "w")
     taken = not codec.audio_rates or rate in codec.audio_rates
     added = container.add_stream(form.sound, rate if taken else SOUND_RATE)

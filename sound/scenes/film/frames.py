@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from sound.scenes.film.ground import SKYLIGHT, SUNLIGHT, Ground, sun_behind, unit
 from sound.scenes.film.rays import Flags, Floats, PlacedSurface, RayedSurface, View, Window
-from sound.scenes.picture import Picture, linear_light
+from sound.scenes.performance import Picture, linear_light
 
 Bytes = NDArray[np.uint8]
 Numbers = NDArray[np.intp]
@@ -35,15 +35,7 @@ NOBODY = -1
 
 
 class Stage:
-    """A scene with camera, lights and colours.
-
-    Parameters
-    ----------
-    picture
-        Visible part of the scene.
-    size
-        Width and height [pixels].
-    """
+    """A scene with camera, lights and colours, in frames of a width and height [pixels]."""
 
     def __init__(self, picture: Picture, size: tuple[int, int]) -> None:
         self.motion = picture.motion
@@ -78,8 +70,6 @@ class Stage:
 
 
 class _Moment:
-    """The solids of a scene at a time."""
-
     def __init__(self, stage: Stage, placed: Sequence[PlacedSurface]) -> None:
         self.stage, self.placed = stage, placed
         self.windows = [stage.view.window(each.points(each.surface.vertices)) for each in placed]
@@ -94,10 +84,7 @@ class _Moment:
     def seen(self, places: NDArray[np.floating], behind: Floats) -> tuple[Floats, Numbers]:
         """Light (n, 3) that comes from places (n, 2) [pixels], and numbers (n,) of the solids.
 
-        Parameters
-        ----------
-        behind : (n, 3)
-            Light where there is no solid; the number there is `NOBODY`.
+        Where there is no solid, it is the light `behind` (n, 3), and the number is `NOBODY`.
         """
         directions = self.stage.view.directions(places)
         owners, ways, normals = self._met(places, directions)
@@ -124,7 +111,6 @@ class _Moment:
         return owners, ways, normals
 
     def _shaded(self, number: int, points: Floats, normals: Floats, directions: Floats) -> Floats:
-        """Light (n, 3) from points of a solid towards the eye."""
         sun = self.stage.sun
         direct = np.maximum(normals @ sun, 0.0) * self._sunny(number, points, normals)
         upwards = 0.5 + 0.5 * normals[:, 2:]
@@ -136,7 +122,6 @@ class _Moment:
         return (diffuse + gleam[:, None] * SUNLIGHT).astype(np.float32)
 
     def _sunny(self, number: int, points: Floats, normals: Floats) -> Flags:
-        """Whether the sun shines on points (n, 3) of a solid."""
         sun, solid = self.stage.sun, self.placed[number]
         sunny = normals @ sun > 0.0
         for other in self.placed:
@@ -154,7 +139,6 @@ def _centres(pixels: tuple[Numbers, ...]) -> NDArray[np.float64]:
 
 
 def _within(places: NDArray[np.floating], window: Window) -> Flags:
-    """Which positions (n, 2) lie in a window of the picture."""
     (x, y), (rows, columns) = places.T, window
     return (columns.start <= x) & (x < columns.stop) & (rows.start <= y) & (y < rows.stop)
 

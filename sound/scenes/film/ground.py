@@ -45,19 +45,12 @@ GOLDEN_ANGLE = np.pi * (3.0 - 5.0**0.5)
 
 
 class Light:
-    """A light that falls on the ground from many directions.
+    """A light that falls on the ground from `directions` (s * s, 3), unit vectors of equal weight
+    towards it.
 
     Each pixel of a square samples another direction, and the mean over the pixels around it is
-    smooth, for one ray a pixel (interleaved sampling, Keller and Heidrich 2001).
-
-    Parameters
-    ----------
-    colour : (3,)
-        Light that unshaded white ground reflects.
-    directions : (s * s, 3)
-        Unit vectors towards the light, of equal weight.
-    step : int
-        Distance of sampled pixels.
+    smooth, for one ray a pixel (interleaved sampling, Keller and Heidrich 2001).  Sampled pixels
+    are `step` apart; unshaded white ground reflects `colour` (3,).
     """
 
     def __init__(self, colour: Floats, directions: Floats, step: int) -> None:
@@ -78,11 +71,9 @@ class Light:
         return self._smooth(dark, ground.seen.shape)
 
     def _thinned(self, span: slice) -> slice:
-        """Numbers of the sampled pixels in a span of pixels."""
         return slice(-(-span.start // self.step), -(-span.stop // self.step))
 
     def _smooth(self, dark: Flags, shape: tuple[int, ...]) -> tuple[Window, Floats]:
-        """Result of `kept_off`, from the sampled pixels in the dark."""
         rows, columns = _bounds(dark, margin=self.side)
         share = uniform_filter(dark[rows, columns].astype(np.float32), self.side)
         share = uniform_filter(share, self.side).repeat(self.step, axis=0)
@@ -92,30 +83,17 @@ class Light:
         return window, share[:height, :width]
 
     def _window(self, solid: PlacedSurface, ground: Ground) -> Window:
-        """Window of the picture that contains a solid's shadow."""
         corners = solid.points(solid.surface.corners)[:, None]
         ways = (corners[..., 2] - ground.height) / self.directions[:, 2]
         return ground.view.window((corners - ways[..., None] * self.directions).reshape(-1, 3))
 
 
 class Ground:
-    """Tiled ground and sky in the picture.
+    """Tiled ground at a height [m], minus infinity for none, and sky in the picture.
 
-    Parameters
-    ----------
-    height : float [m]
-        Height; minus infinity without a ground.
-
-    Attributes
-    ----------
-    seen : (H, W)
-        Whether a pixel shows the ground.
-    points : (H, W, 3) [m]
-        Points of the ground where it is visible.
-    reflectance : (H, W, 3)
-        Reflectance of the ground, which fades towards the horizon.
-    bright : (H, W, 3)
-        The picture without shadows.
+    `seen` (H, W) tells where the ground is visible, and `points` (H, W, 3) [m] are its points
+    there; `reflectance` (H, W, 3) fades towards the horizon, `bright` (H, W, 3) is the picture
+    without shadows.
     """
 
     def __init__(self, height: float, view: View, sun: Floats) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from carillon.arrays import Flags
 from sound.scenes.packages import scene_package
-from sound.scenes.picture import Camera
+from sound.scenes.performance import Camera
 
-Flags = NDArray[np.bool_]
 Floats = NDArray[np.float32]
 Window = tuple[slice, slice]
 """Part of a picture: rows and columns."""
@@ -22,15 +22,7 @@ CREASE_DEGREES = 40.0
 
 
 class View:
-    """Pixels of a picture, and rays through them.
-
-    Parameters
-    ----------
-    camera
-        Camera.
-    size
-        Width and height [pixels].
-    """
+    """Pixels of a camera's picture of a width and height [pixels], and rays through them."""
 
     def __init__(self, camera: Camera, size: tuple[int, int]) -> None:
         self.width, self.height = size
@@ -79,16 +71,10 @@ def _span(first: float, last: float, count: int) -> slice:
 
 
 class Meetings(NamedTuple):
-    """First intersections of rays with a surface, without the rays that miss it.
+    """First intersections with a surface of those rays that meet it, by their numbers (m,).
 
-    Attributes
-    ----------
-    rays : (m,)
-        Numbers of the rays.
-    ways : (m,)
-        Distances, in lengths of the rays' directions.
-    normals : (m, 3)
-        Unit normals on the rays' side, smooth but for creases.
+    `ways` (m,) are distances, in lengths of the rays' directions; `normals` (m, 3) are unit vectors
+    on the rays' side, smooth but for creases.
     """
 
     rays: NDArray[np.intp]
@@ -97,21 +83,10 @@ class Meetings(NamedTuple):
 
 
 class RayedSurface:
-    """A surface in its own axes, intersected by rays.
+    """A surface of vertices (V, 3) [m] and triangles (F, 3) in its own axes, intersected by rays.
 
-    Parameters
-    ----------
-    vertices : (V, 3) [m]
-        Vertices.
-    faces : (F, 3)
-        Triangles.
-
-    Attributes
-    ----------
-    radius : float [m]
-        Radius of the sphere around it, about the origin of its axes.
-    corners : (8, 3) [m]
-        Corners of the box around it.
+    `radius` [m] is that of the sphere around it, about the origin of its axes, and `corners` (8, 3)
+    [m] are those of the box around it.
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> None:
@@ -144,16 +119,8 @@ class RayedSurface:
 
 @dataclass(frozen=True)
 class PlacedSurface:
-    """A surface in a scene.
-
-    Attributes
-    ----------
-    surface
-        Surface in its own axes.
-    position : (3,) [m]
-        Position of the axes' origin.
-    rotation : (3, 3)
-        Rotation from its axes to those of the scene.
+    """A surface in a scene: `position` (3,) [m] of the origin of its axes, and `rotation` (3, 3)
+    from these to the scene's.
     """
 
     surface: RayedSurface

@@ -9,12 +9,12 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.processes.threads import in_parallel
+from sound.scenes.audible.contact_damping import rests_of
 from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, along, heard, towards
 from sound.scenes.audible.loudness import CHANNELS, click, clip_noise, mode_gains
-from sound.scenes.audible.resting_contact import rests_of
 from sound.scenes.audible.sustained_contact import SustainedForce, sustained_force
-from sound.scenes.body import Body
+from sound.scenes.bodies import Body
 from sound.scenes.contact.engine import Course
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact
 from sound.scenes.materials import NamedMaterial
@@ -28,22 +28,10 @@ AT_ONCE = 16
 
 @dataclass(frozen=True)
 class SceneSound:
-    """The sound of a scene, body by body.
+    """The sound of a scene at the listener's head, body by body, of `count` samples.
 
-    Attributes
-    ----------
-    bodies, course
-        All bodies, and their motion.
-    impacts, contacts, forces
-        Impacts, contacts by pairs, and sustained forces of the whole scene.
-    gains : B arrays (K, CHANNELS) [Pa m]
-        Gains of each body's modes.
-    head
-        Listener's head.
-    settings, engine
-        Settings of the sound and of the simulation.
-    count
-        Number of samples.
+    `impacts`, `contacts` by pairs and sustained `forces` are those of the whole scene; `gains` has
+    an array (K, CHANNELS) [Pa m] for the modes of each body.
     """
 
     bodies: Sequence[Body]
@@ -87,7 +75,10 @@ class SceneSound:
         modes = self._modes(number, body, impacts)
         total += modes[:, 0]
         if self.gains[number][:, 1:].any():
-            rotations = _matrices(motion.rotations[:, number])
+            from scipy.spatial.transform import Rotation
+
+            quaternions = motion.rotations[:, number][:, [1, 2, 3, 0]]
+            rotations = Rotation.from_quat(quaternions).as_matrix()
             turned = np.einsum("tij,ti->tj", rotations, directions)
             total += along(modes[:, 1:], frames, turned)
         if body.listening is not None and settings.noise:
@@ -152,9 +143,3 @@ def gains_of(bodies: Sequence[Body], radiation: bool, threads: int) -> list[Arra
     return [
         gains.get(id(each.solid), silent) * 10.0 ** (each.entry.level / 20.0) for each in bodies
     ]
-
-
-def _matrices(quaternions: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix())

@@ -35,21 +35,13 @@ BALL = {"name": "ball", "radius": BALL_RADIUS, "material": "steel", "count": 0, 
 
 
 def tune_of(notes: str) -> Scene:
-    """The scene of a tune, a bar for every note.
+    """The scene of a tune, a bar for each of the notes, named C6 or F#5, with blanks or commas
+    between.
 
     A ball that lands on a bar with the speed w leaves it with e w, and is back at the bar's height
     after 2 e w / g.  Each bar is lower than the one before by w^2 (1 - e^2) / (2 g), which makes up
-    for the loss of a bounce, so all bounces are alike and take (1 + e) w / g.
-
-    Parameters
-    ----------
-    notes
-        Names such as C6 or F#5, separated by blanks or commas.
-
-    Raises
-    ------
-    UserError
-        If there are none, too many, or one has no such name.
+    for the loss of a bounce, so all bounces are alike and take (1 + e) w / g.  Raises UserError if
+    there are no notes, too many, or one has no such name.
     """
     names = notes.replace(",", " ").split()
     if not 1 <= len(names) <= MOST_NOTES:

@@ -1,10 +1,10 @@
-"""Options of commands that search for a material."""
+"""Options that several commands have in common."""
 
 from __future__ import annotations
 
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Count, Positive, Workers
-from sound.project.settings import OptimiserMethod
+from sound.project.settings import Dampings, OptimiserMethod
 
 
 @parameters
@@ -17,3 +17,14 @@ class SearchOptions:
     )
     method: OptimiserMethod | None = option(None, "not the project's")
     workers: Workers | None = option(None, "processes, not the project's")
+
+
+@parameters
+class DampingOptions:
+    """Whose dampings sound."""
+
+    damping_from: Dampings | None = option(
+        None,
+        "dampings of the clips, or those that loss factors of the material make, not as the "
+        "project says",
+    )

@@ -1,4 +1,4 @@
-"""Descent by damped Gauss-Newton steps.
+"""Descents by damped Gauss-Newton steps, and by L-BFGS (scipy), which knows the gradient alone.
 
 The cost is a sum of squares whose Jacobian J is known, so J^T J stands for the Hessian that
 quasi-Newton methods have to learn from gradients; it is damped as by Levenberg and Marquardt.
@@ -20,20 +20,17 @@ HARDER, SOFTER = 8.0, 0.25
 FORETOLD = 0.5
 """Least decrease of the cost, over the predicted one, after which the damping is reduced."""
 TINY = 1e-300
+LARGE = 1e12
+"""Cost of a material without modes."""
 
 
 @dataclass(frozen=True)
 class StepOptions:
     """Options of the Gauss-Newton steps of a descent.
 
-    Attributes
-    ----------
-    parts
-        Terms that successive steps reduce in turn: whether E_f, whether E_a.
-    damping
-        First damping, over the mean curvature.
-    longest
-        Greatest root mean square change of Phi z in a step.
+    `parts` are the terms that successive steps reduce in turn: whether E_f, whether E_a.  `damping`
+    is the first one, over the mean curvature, and `longest` the greatest root mean square change of
+    Phi z in a step.
     """
 
     parts: tuple[tuple[bool, bool], ...]
@@ -51,21 +48,8 @@ def descend(
 ) -> DesignDescent:
     """Up to `steps` steps from z, each of which lowers the whole of Eq. (4).
 
-    Parameters
-    ----------
-    descent
-        Solid, objective and limits.
-    z, start
-        First material, see `Descent.begin`.
-    options, steps
-        Options of the steps, and their greatest number.
-    damping
-        State at the end of a former descent with the same options.
-
-    Raises
-    ------
-    ConvergenceError
-        If the first material has no modes.
+    `Descent.begin` describes z and start; `damping` is the state at the end of a former descent
+    with the same options.  Raises ConvergenceError if the first material has no modes.
     """
     count = len(options.parts)
     descent.begin(z, start, damping or (options.damping,) * count)
@@ -82,7 +66,6 @@ def descend(
 
 
 def _step(descent: Descent, options: StepOptions, part: int) -> bool:
-    """Take a step that lowers the cost, if there is one."""
     record, last = descent.record, descent.last
     curvature, gradient = descent.normal_equations(last, *options.parts[part])
     damping = record.damping[part]
@@ -110,8 +93,51 @@ def _replaced(values: tuple[float, ...], index: int, value: float) -> tuple[floa
 
 
 def _damped(curvature: Array, gradient: Array, damping: float, longest: float) -> Array:
-    """Step of the damped normal equations, not longer than `longest`."""
     size = len(curvature)
     damped = curvature + damping * np.trace(curvature) / size * np.eye(size)
     step = -np.linalg.solve(damped, gradient)
     return np.asarray(step * min(1.0, longest / max(float(np.linalg.norm(step)), TINY)))
+
+
+@dataclass(frozen=True)
+class LimitedMemory:
+    """Options of a descent by L-BFGS: so many `evaluations` of gradients stand for one Gauss-Newton
+    step.
+    """
+
+    evaluations: int
+
+
+def descend_by_gradients(
+    descent: Descent, z: Array, start: Array | None, evaluations: int
+) -> DesignDescent:
+    """Descend from z with about `evaluations` gradients; `descend` has the other parameters.
+
+    Raises ConvergenceError if the first material has no modes.
+    """
+    from scipy.optimize import minimize
+
+    descent.begin(z, start)
+    record = descent.record
+
+    def value(point: Array) -> tuple[float, Array]:
+        if descent.is_over:
+            raise _LimitError
+        tried = descent.tried(point, descent.last.modes, derivatives=True)
+        if tried is None:
+            return LARGE, np.zeros(len(point))
+        evaluation, cost = tried
+        if cost.total < record.cost.total:
+            descent.come_to(evaluation, cost)
+        return cost.total, descent.normal_equations(evaluation)[1]
+
+    try:
+        minimize(value, z, jac=True, method="L-BFGS-B", options={"maxfun": evaluations})
+    except _LimitError:
+        return record
+    record.stalled = len(record.costs) == 1
+    return record
+
+
+class _LimitError(Exception):
+    """A limit is reached."""
