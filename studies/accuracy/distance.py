@@ -64,11 +64,8 @@ def measure_distances(objects: tuple[str, ...], options: DistanceStudyOptions) -
 
     `objects`: mesh files or built-in objects.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `solids`, each with its reference and `ways`; `right`, of every way the number
-        of expected errors within a factor of `FACTOR` and of all.
+    Returns plain values: `solids`, each with its reference and `ways`; `right`, of every way the
+    number of expected errors within a factor of `FACTOR` and of all.
     """
     if options.reference <= options.resolution:
         raise UserError(

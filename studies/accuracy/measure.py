@@ -66,12 +66,10 @@ class AccuracyOptions:
 def measure_accuracy(options: AccuracyOptions) -> dict[str, Any]:
     """Measure every discretisation of every solid.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `references`, a solid an entry, with its frequencies [Hz] and their largest
-        relative change from lower degrees; `levels`, a model an entry; `summary`, see `summarised`;
-        `without`, a sentence if there are no tetrahedra; `packages`, versions of what made them.
+    Returns plain values: `references`, a solid an entry, with its frequencies [Hz] and their
+    largest relative change from lower degrees; `levels`, a model an entry; `summary`, see
+    `summarised`; `without`, a sentence if there are no tetrahedra; `packages`, versions of what
+    made them.
     """
     without = missing()
     kinds = [*DISCRETISATIONS, *(() if without else ORDERS)]

@@ -64,11 +64,8 @@ def benchmark_row(
     Without forests, neither named nor default ones, the methods that need them are left out with a
     sentence, and their figures are None.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `seconds`, `spread`, `eigenvalue_error`, `frequency_error`, `speedup` by
-        method, sizes, the machine; `meaning` explains them.
+    Returns plain values: `seconds`, `spread`, `eigenvalue_error`, `frequency_error`, `speedup` by
+    method, sizes, the machine; `meaning` explains them.
 
     Raises
     ------

@@ -47,6 +47,9 @@ def correction_history(
     Raises UserError if there are too few unknowns for so many modes, or `truth` is not of this
     solid.
 
+    Returns plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`,
+    `values` (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
+
     Parameters
     ----------
     model
@@ -57,12 +60,6 @@ def correction_history(
         Corrections made.
     truth
         Modes file of the same solid with its exact eigenvalues; SLEPc finds them if not given.
-
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`,
-        `values` (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
     """
     bcast_from_root(comm, lambda: check_mode_count(modes, cast(Solid, model).n_dofs))
     exact = _exact(model, modes, truth, comm)[RIGID_MODES:]

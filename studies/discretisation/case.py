@@ -40,6 +40,9 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
 
     Raises UserError for anything wrong with the solid, or if it has too few unknowns.
 
+    Returns plain values: `truth`, see `truth_between`, and `ways`, see `Ways`: unknowns, seconds,
+    and errors `against` the `solid` and against its `voxels`.
+
     Parameters
     ----------
     options
@@ -48,12 +51,6 @@ def rate_discretisations(options: ProblemOptions, modes: int, runs: int) -> dict
         Number of modes, rigid ones included.
     runs
         Rounds, in each of which every way runs once; medians of the seconds are told.
-
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `truth`, see `truth_between`, and `ways`, see `Ways`: unknowns, seconds, and
-        errors `against` the `solid` and against its `voxels`.
     """
     coarsening = replace(options, coarsen=FOREST).coarsening()
     assert coarsening is not None

@@ -26,12 +26,9 @@ def truth_between(cells: TimedSpectrum, finest: TimedSpectrum, left: float) -> d
 
     The middle of what may be left of their difference, a share from 0 to `left`, is taken off.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `frequencies_hz` of the elastic modes; `doubt_rms` and `doubt_worst`, the
-        relative errors that they may have; of the spectrum on the finer lattice `finest_hz`,
-        `n_dofs` and `seconds`.
+    Returns plain values: `frequencies_hz` of the elastic modes; `doubt_rms` and `doubt_worst`, the
+    relative errors that they may have; of the spectrum on the finer lattice `finest_hz`, `n_dofs`
+    and `seconds`.
 
     Examples
     --------

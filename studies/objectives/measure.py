@@ -52,12 +52,9 @@ def rate_objectives(
     another Poisson's ratio.  All coarse models have the same mesh; they and the fine one are
     solved by SLEPc.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: sizes, `forest` (which; None without, then `without_forest` says why), `truth`
-        (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening with the errors over
-        modes 7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse model has.
+    Returns plain values: sizes, `forest` (which; None without, then `without_forest` says why),
+    `truth` (evidence, seconds, frequencies [Hz]) and `rows`, one a coarsening with the errors over
+    modes 7..60 (`audible`) and 7..`modes` (`all`), or as many as the coarse model has.
     """
     solid = compute_on_root(comm, lambda: _read(options, objectives))
     truth = _solve(None if solid is None else solid.problem.model, modes, comm)

@@ -121,13 +121,10 @@ def profile(model: Solid, options: ProfileOptions, seed: int = 0) -> dict[str, A
 
     Raises UserError, see `ModalSolver`; also if the solid is too large to be factorised.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: sizes, and columns of a `block` of right-hand sides; `threads`, and of how
-        many `runs` medians are taken; `seconds` from moduli to verified modes by
-        `ModalSolver.solve`; `phases` by name, see `Phase`; rates of a product of large matrices
-        and of a copy (read and written) on all threads.
+    Returns plain values: sizes, and columns of a `block` of right-hand sides; `threads`, and of how
+    many `runs` medians are taken; `seconds` from moduli to verified modes by `ModalSolver.solve`;
+    `phases` by name, see `Phase`; rates of a product of large matrices and of a copy (read and
+    written) on all threads.
     """
     asked = SolverOptions(modes=options.modes, seed=seed)
     solver = ModalSolver(model, asked, MPI.COMM_SELF)

@@ -44,13 +44,10 @@ def measure(
 
     Raises UserError if there are too few unknowns for so many modes, or more ranks than subdomains.
 
-    Returns
-    -------
-    dict[str, Any]
-        Plain values: `phases` with the seconds of each rank, and of the synthesis also waiting [s],
-        flops, bytes and messages; `seconds` of all but the partition, `peak_memory_bytes` of each
-        rank, `link` (latency [s], bandwidth [B/s] between two ranks; None on one), sizes, ranks and
-        cores.
+    Returns plain values: `phases` with the seconds of each rank, and of the synthesis also waiting
+    [s], flops, bytes and messages; `seconds` of all but the partition, `peak_memory_bytes` of each
+    rank, `link` (latency [s], bandwidth [B/s] between two ranks; None on one), sizes, ranks and
+    cores.
     """
     bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
     reuse_freed_memory()

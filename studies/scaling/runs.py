@@ -68,18 +68,15 @@ def scaling_study(
 
     Raises UserError for anything wrong with the solid, or if all runs fail.
 
+    Returns plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was
+    said by those that `failed`, and `model`.
+
     Parameters
     ----------
     options
         The solid.
     arguments
         Command-line arguments of a run, without mesh and resolution.
-
-    Returns
-    -------
-    Result
-        Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said
-        by those that `failed`, and `model`.
     """
     require_ranks(max(scaling.ranks))
     problem = build_problem(options)
