@@ -18,14 +18,12 @@ from carillon.files.paths import require_writable
 from dataset_gen.journal import Journal, discard_journal, journal_of
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import Shard, origin_of, read_settings, shard_of, write_rows
-from dataset_gen.tasks import ROW, ShardPlan, rows_of
-from dataset_gen.workers import in_this_process, in_workers
+from dataset_gen.tasks import ROW, ShardPlan, in_this_process, in_workers, rows_of
 
 logger = logging.getLogger(__name__)
 
 Engine = Callable[[ShardPlan, range], Generator[bytes, None, None]]
-"""Yields the results of tasks in order; see `dataset_gen.workers` and `dataset_gen.ranks`."""
-
+"""Yields the results of tasks in order; see `dataset_gen.tasks` and `dataset_gen.ranks`."""
 _ENVIRONMENT = ("commit", "versions", "processor")
 """Attributes of an interrupted shard that may differ when it is gone on with."""
 
@@ -33,10 +31,7 @@ _ENVIRONMENT = ("commit", "versions", "processor")
 def engine_of(workers: int) -> Engine:
     """The engine for a number of processes on this machine.
 
-    Raises
-    ------
-    UserError
-        For less than one.
+    Raises UserError for less than one.
     """
     if workers < 1:
         raise UserError(f"{workers} workers requested, expected at least 1")
@@ -49,13 +44,8 @@ def generate(options: ShardOptions, workers: int = 1, progress: bool = True) -> 
     """Fit one shard in memory.
 
     A script that asks for several workers needs the usual `if __name__ == "__main__":`, since they
-    import it.
-
-    Raises
-    ------
-    UserError
-        For an unknown objective or distribution, an impossible split, seed, range of moduli,
-        Poisson's ratio or number of workers.
+    import it. Raises UserError for an unknown objective or distribution, an impossible split, seed,
+    range of moduli, Poisson's ratio or number of workers.
     """
     settings = settings_of(options)
     plan = ShardPlan(settings)
@@ -74,18 +64,10 @@ def generate_file(
     Finished tasks go to the journal beside `path` and to the shard, which gets its name when it is
     complete; an interrupted one is written again from the journal. A shard that was interrupted has
     the same bytes as one that was not, unless it was finished with other software or on another
-    machine: those are then listed in its provenance, `resumed_on`.
-
-    Returns
-    -------
-    int or None
-        Samples that were fitted; None if `path` is this very shard already.
-
-    Raises
-    ------
-    UserError
-        If `path` is anything else, another process is writing it, the journal beside it belongs to
-        other settings, or the disk is full or too small; what was done by then is kept.
+    machine: those are then listed in its provenance, `resumed_on`. Returns how many
+    samples were fitted; None if `path` is this very shard already. Raises UserError if `path` is
+    anything else, another process is writing it, the journal beside it belongs to other settings,
+    or the disk is full or too small; what was done by then is kept.
     """
     path = require_writable(path)
     if _is_there(path, plan):
@@ -109,7 +91,6 @@ def generate_file(
 
 
 def _require_room(path: Path, plan: ShardPlan) -> None:
-    """Refuse a shard that the disk cannot take: journal and shard are there at the same time."""
     free = shutil.disk_usage(path.parent).free
     begun = journal_of(path)
     if begun.exists():

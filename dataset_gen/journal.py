@@ -30,7 +30,6 @@ logger = logging.getLogger(__name__)
 
 SYNC_SECONDS = 1.0
 """Work that is lost with a machine that loses power; a process that is killed loses none of it."""
-
 _TITLE = b"Carillon journal of a shard, 1\n"
 _FRAME = struct.Struct("<4sQI")
 _PLAN, _ENVIRONMENT, _TASK = b"PLAN", b"ENVI", b"TASK"
@@ -53,18 +52,15 @@ def discard_journal(path: Path) -> None:
 class Journal:
     """The journal beside the shard `path`, locked and ready to be continued.
 
+    Raises UserError if another process works on the shard, or the journal cannot be written, is
+    damaged at its beginning, or belongs to other settings.
+
     Attributes
     ----------
     tasks
         Tasks it holds, the first ones of the plan.
     environments
         Where the work was done, one record for each change.
-
-    Raises
-    ------
-    UserError
-        If another process works on the shard, or the journal cannot be written, is damaged at its
-        beginning, or belongs to other settings.
     """
 
     def __init__(self, path: Path, plan: ShardPlan, environment: dict[str, Any]) -> None:
@@ -94,10 +90,7 @@ class Journal:
     def append(self, work: bytes) -> None:
         """Add the result of the next task.
 
-        Raises
-        ------
-        UserError
-            If it cannot be written; all earlier tasks are kept.
+        Raises UserError if it cannot be written; all earlier tasks are kept.
         """
         self._append(_TASK, work)
         self.tasks += 1
@@ -240,7 +233,6 @@ def _read(file: int, length: int, position: int) -> bytes:
 
 
 def _locked(journal: Path) -> int:
-    """Open the journal, made if need be, for this process alone."""
     return take(
         journal,
         f"{journal}: another process is generating this shard; wait for it, or choose another name",

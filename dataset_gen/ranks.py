@@ -17,11 +17,8 @@ logger = logging.getLogger(__name__)
 def run_on_ranks(comm: Comm, make: Callable[[Engine], int]) -> int:
     """Call `make` on rank 0 with an engine for which all ranks work; its exit status on every rank.
 
-    Raises
-    ------
-    UserError
-        On every rank if `make` raises it before the ranks have begun to work; later, on the one
-        rank that failed, see `exit_status.run`, which ends all of them.
+    Raises UserError on every rank if `make` raises it before the ranks have begun to work; later,
+    on the one rank that failed, see `exit_status.run`, which ends all of them.
     """
     _warn_about_cores(comm)
     if comm.rank > 0:
@@ -70,7 +67,6 @@ def _follow(comm: Comm) -> int:
 
 
 def _warn_about_cores(comm: Comm) -> None:
-    """Say so if the ranks of a machine are more than the cores they may run on together."""
     from mpi4py import MPI
 
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)

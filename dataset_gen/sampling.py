@@ -10,27 +10,22 @@ from functools import cache
 
 import numpy as np
 from numpy.random import Generator, Philox
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
 from carillon.fem.block import least_patterns, pattern_images, symmetries
-from carillon.fem.element import Array
 
 DISTRIBUTIONS = {"uniform": (0.0, 10.0), "log-uniform": (0.01, 1000.0)}
 """Distributions of the fine moduli and their ranges in GPa unless told otherwise.
 
 The paper's (section 8.1) is uniform in 0..10; log-uniform spans rubber to diamond.
 """
-
 EXTREMES = (1e-9, 1e9)
 """Least and largest ends of a range in GPa, zero aside: what squares and products can bear."""
-
 LARGEST_CONTRAST = 1e8
 """Most that the ends of a log-uniform range may differ: beyond, stiffness loses its digits."""
-
 HYPERCUBE = 1024
 """Samples of one Latin hypercube."""
-
 NEIGHBOURS = (1, 2, 4)
 """Cells adjacent to the origin of the ordering, cell 0 (section 7.1.1)."""
 
@@ -103,10 +98,7 @@ def moduli(
 ) -> Moduli:
     """Validated `Moduli`; ends that are not given are those of the distribution.
 
-    Raises
-    ------
-    UserError
-        For an unknown distribution or an impossible range.
+    Raises UserError for an unknown distribution or an impossible range.
     """
     lowest, highest = DISTRIBUTIONS.get(distribution, (0.0, 1.0))
     drawn = Moduli(
@@ -149,14 +141,14 @@ class Mixture:
 
 
 @cache
-def pattern_classes() -> list[NDArray[np.int64]]:
+def pattern_classes() -> list[Index]:
     """The 21 classes of the 255 fill patterns (bit masks) under the 48 symmetries; full is last."""
     least = pattern_images().min(axis=1)
     return [np.flatnonzero(least == representative) for representative in least_patterns()]
 
 
 @cache
-def _class_table() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _class_table() -> tuple[Index, Index]:
     """`pattern_classes` as one table, padded with zeros, and the size of each class."""
     classes = pattern_classes()
     sizes = np.array([len(masks) for masks in classes])
@@ -171,7 +163,7 @@ def _latin_hypercube(generator: Generator) -> Array:
     return np.asarray((np.stack(columns, axis=1) + generator.random((HYPERCUBE, 8))) / HYPERCUBE)
 
 
-def _void_patterns(generator: Generator, share: float, uniform: NDArray[np.bool_]) -> Array:
+def _void_patterns(generator: Generator, share: float, uniform: Flags) -> Array:
     """Filled cells (1024, 8) as 0 and 1; uniform blocks run through all classes in turn."""
     classes = pattern_classes()
     partial = classes[:-1]
@@ -216,11 +208,7 @@ def hypercube(
 
 
 def samples(
-    seed: int,
-    start: int,
-    stop: int,
-    moduli: Moduli = Moduli(),
-    mixture: Mixture = Mixture(),
+    seed: int, start: int, stop: int, moduli: Moduli = Moduli(), mixture: Mixture = Mixture()
 ) -> Array:
     """Blocks start..stop-1 (n, 8) of the endless sequence that belongs to `seed`, in GPa."""
     if seed < 0 or start < 0 or stop <= start:
@@ -236,10 +224,7 @@ def samples(
 def shard_range(total: int, shard: int, shards: int) -> tuple[int, int]:
     """First and past-the-last sample of one of `shards` nearly equal parts of 0..total-1.
 
-    Raises
-    ------
-    UserError
-        If the shard does not exist or would be empty.
+    Raises UserError if the shard does not exist or would be empty.
     """
     if total < 1:
         raise UserError(f"{total} samples requested, expected at least 1")

@@ -27,7 +27,6 @@ from dataset_gen.sampling import DISTRIBUTIONS, Moduli, moduli, shard_range
 SEED_BITS = 63
 """Seeds fit into a signed integer of the file format."""
 
-
 _ROW_MAKERS = (
     Path(block.__file__),
     Path(element.__file__),
@@ -121,11 +120,8 @@ _LABELS = {
 def settings_of(options: ShardOptions) -> Settings:
     """Settings of a shard.
 
-    Raises
-    ------
-    UserError
-        For an unknown objective or distribution, an impossible split, seed, range of moduli or
-        Poisson's ratio.
+    Raises UserError for an unknown objective or distribution, an impossible split, seed, range of
+    moduli or Poisson's ratio.
     """
     require_objective(options.objective, DATASET_OBJECTIVES)
     require_poisson(options.poisson)
@@ -150,10 +146,7 @@ def settings_of(options: ShardOptions) -> Settings:
 def settings_from(values: Mapping[str, Any]) -> Settings:
     """Settings from the plain values of `Settings.as_dict`.
 
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        If a value is missing or no such value.
+    Raises KeyError, TypeError, ValueError if a value is missing or no such value.
     """
     types = get_type_hints(Settings)
     return Settings(**{name: convert(values[name]) for name, convert in types.items()})

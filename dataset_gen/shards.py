@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags
 from carillon.errors import UserError
-from carillon.fem.element import Array
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
 from dataset_gen.sampling import Moduli
@@ -27,14 +27,12 @@ UNIT = "GPa"
 
 PIECE_ROWS = 16 * CHUNK_ROWS
 """Samples that are read at a time unless told otherwise, 9 MB."""
-
 _LONG_NAMES = {
     "fine": "Young's moduli of the eight fine cells, bit order x + 2 y + 4 z, 0 is void",
     "coarse": "fitted Young's moduli at the coarse element's quadrature points, bit order",
     "residual": "root of the objective relative to its value for zero moduli",
     "converged": "whether the minimiser settled",
 }
-
 
 _OF_ONE_KIND = {"objective": "objective", "poisson": "Poisson's ratio", "code": "code"}
 """Settings that shards to be used together must share, with their names for people."""
@@ -60,7 +58,7 @@ class Shard:
     fine: Array
     coarse: Array
     residual: Array
-    converged: NDArray[np.bool_]
+    converged: Flags
     provenance: dict[str, Any]
 
     @property
@@ -192,10 +190,7 @@ def _opened(path: Path) -> Iterator[tuple[h5py.File, Settings]]:
 def read_settings(path: str | Path) -> Settings:
     """Settings of a shard that is complete and undamaged.
 
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, or of another kind or schema.
+    Raises UserError if the file is missing, damaged, or of another kind or schema.
     """
     with _opened(Path(path)) as (_, settings):
         return settings
@@ -207,12 +202,9 @@ def iterate_shard(
     """Read one shard in validated pieces of `rows` samples, in order and in constant memory.
 
     Each piece is a shard of its own sample range. The whole file is checked before the first one,
-    also if only its samples `first` up to `past`, counted from its own start, are read.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another kind or schema, or holds impossible values.
+    also if only its samples `first` up to `past`, counted from its own start, are read. Raises
+    UserError if the file is missing, damaged, of another kind or schema, or holds impossible
+    values.
     """
     path = Path(path)
     with _opened(path) as (file, settings):
@@ -272,11 +264,8 @@ def in_order(
 ) -> list[tuple[str | Path, Settings]]:
     """Shards that belong together, ordered by seed, distribution and sample number.
 
-    Raises
-    ------
-    UserError
-        If there is none, objectives, Poisson's ratios or the code of the fits differ, or samples
-        overlap.
+    Raises UserError if there is none, objectives, Poisson's ratios or the code of the fits differ,
+    or samples overlap.
     """
     if not paths:
         raise UserError("no dataset given, name at least one shard")

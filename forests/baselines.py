@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import galerkin_moduli
-from carillon.fem.element import Array
 
 
 def average(young: Array) -> Array:

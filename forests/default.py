@@ -13,10 +13,7 @@ DEFAULT_FILE = Path(__file__).parent / "default.h5"
 def default_path() -> Path:
     """File of the forests that come with the package.
 
-    Raises
-    ------
-    UserError
-        If it is not there.
+    Raises UserError if it is not there.
     """
     if not DEFAULT_FILE.is_file():
         raise UserError(

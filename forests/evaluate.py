@@ -10,12 +10,11 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from carillon.arrays import Array, Index
 from carillon.errors import UserError
-from carillon.fem.element import Array
-from forests.layout import FEATURE_BITS, FEATURE_MASK
+from forests.layout import FEATURE_BITS, FEATURE_MASK, prefetch
 from forests.model import CONSTANT, HIGH, LOW, Model
 from forests.ordering import FLIPS, order_code
-from forests.prefetch import prefetch
 from forests.scaling import (
     FEATURES,
     LARGEST_MODULUS,
@@ -29,7 +28,6 @@ from forests.scaling import (
 
 MOST_BLOCKS = 1_000_000
 """Blocks that a comparison or a benchmark keeps in memory."""
-
 STRIDE = 8
 """Features of an origin with padding, which saves a multiplication."""
 
@@ -56,8 +54,8 @@ def _walk(
     links: NDArray[np.int32],
     tree: int,
     features: Features,
-    pattern: NDArray[np.int64],
-    numbers: NDArray[np.int64],
+    pattern: Index,
+    numbers: Index,
 ) -> None:
     """Leaves `numbers[:, tree]` of the eight origins of a block.
 
@@ -102,8 +100,8 @@ def _find(
     links: NDArray[np.int32],
     leaves: NDArray[np.float32],
     features: Features,
-    pattern: NDArray[np.int64],
-    numbers: NDArray[np.int64],
+    pattern: Index,
+    numbers: Index,
 ) -> None:
     """Leaves `numbers` (8, trees) of a block; their memory is asked for while other trees run."""
     for tree in range(len(roots)):
@@ -122,9 +120,7 @@ def _linear(leaf: NDArray[np.float32], features: Features, origin: int) -> float
 
 
 @numba.njit(inline="always")
-def _target(
-    leaves: NDArray[np.float32], numbers: NDArray[np.int64], features: Features, origin: int
-) -> float:
+def _target(leaves: NDArray[np.float32], numbers: Index, features: Features, origin: int) -> float:
     """Mean answer of the trees whose leaves are `numbers` (trees,)."""
     total = 0.0
     for tree in range(len(numbers)):
@@ -136,9 +132,7 @@ def _target(
 
 
 @numba.njit(inline="always")
-def _scratch(
-    trees: int,
-) -> tuple[Array, Array, Array, Features, Features, NDArray[np.int64], NDArray[np.int64]]:
+def _scratch(trees: int) -> tuple[Array, Array, Array, Features, Features, Index, Index]:
     """Arrays that one block after the other is worked out in.
 
     Its values, scales and references (8,), features in a row and as a table (8, `STRIDE`), patterns
@@ -174,11 +168,7 @@ def _moduli(
 
 @numba.njit(inline="always")
 def _slopes(
-    leaves: NDArray[np.float32],
-    numbers: NDArray[np.int64],
-    features: Features,
-    origin: int,
-    slopes: Array,
+    leaves: NDArray[np.float32], numbers: Index, features: Features, origin: int, slopes: Array
 ) -> None:
     """Mean slopes (7,) of the trees' answers, zero where an answer is at its bounds."""
     slopes[:] = 0.0
@@ -277,11 +267,8 @@ def _first_unfit(young: Array) -> tuple[int, bool]:
 def require_blocks(e: ArrayLike) -> Array:
     """Blocks (m, 8) as a contiguous array of float64.
 
-    Raises
-    ------
-    UserError
-        For a bad shape, a modulus that is negative, not finite or above `LARGEST_MODULUS`, or a
-        block that is void altogether.
+    Raises UserError for a bad shape, a modulus that is negative, not finite or above
+    `LARGEST_MODULUS`, or a block that is void altogether.
     """
     young = np.ascontiguousarray(e, dtype=float)
     if young.ndim != 2 or young.shape[1] != 8:
@@ -300,7 +287,6 @@ def require_blocks(e: ArrayLike) -> Array:
 def _run(
     kernel: Callable[..., None], model: Model, young: Array, threads: int, *results: NDArray[Any]
 ) -> None:
-    """Apply a compiled function to the blocks, in as many parts as there are threads."""
     forests = model.forests
     roots = np.ascontiguousarray(forests.roots.transpose(1, 0, 2).reshape(-1, 2 * PATTERNS))
     arrays = (roots, forests.thresholds, forests.links, forests.leaves)
@@ -321,6 +307,8 @@ def _run(
 def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
     """Coarse moduli of many blocks (Eq. 12).
 
+    Raises UserError, see `require_blocks`.
+
     Parameters
     ----------
     e : (m, 8)
@@ -332,11 +320,6 @@ def coarsen(model: Model, e: ArrayLike, threads: int = 1) -> Array:
     -------
     (m, 8)
         Positive moduli at the coarse quadrature points, in the unit of `e`.
-
-    Raises
-    ------
-    UserError
-        See `require_blocks`.
 
     Examples
     --------

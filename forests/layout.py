@@ -1,4 +1,7 @@
-"""Where the nodes of the trees stand in memory: eight bytes each, siblings side by side."""
+"""Where the nodes of the trees stand in memory: eight bytes each, siblings side by side.
+
+`prefetch` asks for memory before it is needed, which numba has no function for.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,20 @@ from typing import Any
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 from numpy.typing import DTypeLike, NDArray
 
+from carillon.arrays import Array, Index
 from carillon.errors import UserError
-from carillon.fem.element import Array
 
 NODE = np.dtype([("threshold", np.float32), ("link", np.int32)])
 """A node: the threshold of its split; `left child << 3 | feature`, or `~leaf` in leaves.
 
 A row goes to the left child if its float32 feature is <= the threshold, else to the node after it.
 """
-
 FEATURE_BITS = 3
 FEATURE_MASK = 7
 
@@ -25,7 +31,6 @@ MOST_LEAVES = MOST_NODES // 2
 
 CLUSTER_LEVELS = 4
 """Levels of a subtree that stand together; measured best of 1 to 5."""
-
 CACHE_LINE = 64
 
 
@@ -48,10 +53,10 @@ def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 def _level(
     left: NDArray[np.int32],
     right: NDArray[np.int32],
-    queue: NDArray[np.int64],
+    queue: Index,
     begin: int,
     end: int,
-    position: NDArray[np.int64],
+    position: Index,
     place: int,
 ) -> tuple[int, int]:
     """Place the children of the nodes queue[begin:end]; they are appended to the queue."""
@@ -69,11 +74,8 @@ def _level(
 
 @numba.njit(cache=True)
 def positions(
-    left: NDArray[np.int32],
-    right: NDArray[np.int32],
-    roots: NDArray[np.int64],
-    levels: int,
-) -> NDArray[np.int64]:
+    left: NDArray[np.int32], right: NDArray[np.int32], roots: Index, levels: int
+) -> Index:
     """Position (nodes,) of each node in memory, -1 for nodes that no root leads to.
 
     No root may stand below another. Roots come first, then pairs of siblings: clusters of `levels`
@@ -113,6 +115,8 @@ def pack(
 ) -> tuple[NDArray[np.int32], NDArray[Any], NDArray[np.float32]]:
     """Bring trees, all in one set of arrays, into the order of `positions`.
 
+    Raises UserError if there are too many nodes for 32 bits.
+
     Parameters
     ----------
     feature, threshold, left, right, leaf : (nodes,)
@@ -121,8 +125,6 @@ def pack(
         Root nodes.
     records : (leaves, 10)
         One for each leaf.
-    levels
-        See `positions`.
 
     Returns
     -------
@@ -132,11 +134,6 @@ def pack(
         In the order of `positions`.
     records : (leaves, 10)
         In the order of the nodes.
-
-    Raises
-    ------
-    UserError
-        If there are too many nodes for 32 bits.
     """
     position = positions(left, right, np.unique(roots).astype(np.int64), levels)
     size = int(position.max()) + 1
@@ -153,3 +150,27 @@ def pack(
     ordered = aligned((len(last), records.shape[1]), np.float32)
     ordered[:] = records[leaf[last]]
     return position[roots].astype(np.int32), nodes, ordered
+
+
+def _prefetch(context: Any, array: types.Array, index: types.Integer) -> Any:
+    """Bring the beginning and the end of row `index` of a C-contiguous matrix into the cache."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        matrix = context.make_array(signature.args[0])(context, builder, arguments[0])
+        byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        stride = builder.extract_value(matrix.strides, 0)
+        first = builder.bitcast(matrix.data, byte)
+        row = builder.gep(first, [builder.mul(stride, arguments[1])])
+        end = builder.sub(stride, ir.Constant(stride.type, 1))
+        # To read, of use again, data.
+        options = [word(0), word(3), word(1)]
+        for address in (row, builder.gep(row, [end])):
+            builder.call(function, [address, *options])
+        return context.get_dummy_value()
+
+    return types.void(array, types.int64), generate
+
+
+prefetch: Any = intrinsic(_prefetch)

@@ -24,10 +24,8 @@ SCHEMA = 2
 
 VOID, FILLED = 0, 1
 """Forest of void origins (Reg1 of Eq. 12) and of filled origins (Reg2)."""
-
 CONSTANT, LOW, HIGH = FEATURES, FEATURES + 1, FEATURES + 2
 """Columns of a leaf's record behind its slopes."""
-
 RECORD = FEATURES + 3
 
 
@@ -75,8 +73,6 @@ class Model:
         Objective and Poisson's ratio of the fits.
     transform
         Of the features and the target, one of `forests.scaling.TRANSFORMS`.
-    forests
-        The arrays.
     scores
         On samples that were held out, by name.
     provenance
@@ -157,10 +153,7 @@ def _require_sound(path: Path, forests: Forests) -> None:
 def load_model(path: str | Path | None = None) -> Model:
     """Read and validate a model, by default the one that comes with the package.
 
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another kind or schema, or inconsistent.
+    Raises UserError if the file is missing, damaged, of another kind or schema, or inconsistent.
 
     Examples
     --------

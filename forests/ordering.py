@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array, Index
 
 _AXES = np.array([1, 2, 4])
 
 
-def _flips_of_orders() -> NDArray[np.int64]:
+def _flips_of_orders() -> Index:
     """Row of `FLIPS` for each answer of `order_code`; the two impossible answers stay zero."""
     flips = np.zeros((8, 7), dtype=np.int64)
     for code in range(8):

@@ -17,28 +17,23 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
-from carillon.fem.element import Array
 from forests.ordering import FLIPS, order_code
 
 TRANSFORMS = ("log", "ratio")
 """`ratio` is the paper's; `log` takes logarithms of the features and of the target."""
-
 LOG_FLOOR = float(np.log(1e-5))
 """Log ratios of filled cells are raised to this."""
-
 LOG_VOID = LOG_FLOOR - 3.0
 """Log feature of a void cell: apart from every filled one, so one threshold separates them."""
-
 RATIO_FLOOR = float(np.finfo(np.float32).tiny)
 RATIO_CEILING = float(np.finfo(np.float32).max)
 """Bounds of the ratios of filled cells: none becomes 0, as those of void cells, or infinite."""
-
 FEATURES = 7
 
 PATTERNS = 1 << FEATURES
 """Void patterns of the seven other cells, seen from an origin: bit k is set if e'(k+2) is void."""
-
 LARGEST_MODULUS = 1e300
 """Largest modulus of a cell in any unit; sums of eight of them are still finite."""
 
@@ -63,7 +58,7 @@ class PreparedBlocks(NamedTuple):
     features: Features
     pattern: NDArray[np.uint8]
     scale: Array
-    filled: NDArray[np.bool_]
+    filled: Flags
 
 
 @numba.njit(inline="always")
@@ -121,7 +116,7 @@ def prepare_block(
     logarithmic: bool,
     values: Array,
     features: Features,
-    pattern: NDArray[np.int64],
+    pattern: Index,
     scale: Array,
     references: Array,
 ) -> None:
@@ -162,7 +157,7 @@ def _prepare(
     features: Features,
     pattern: NDArray[np.uint8],
     scale: Array,
-    filled: NDArray[np.bool_],
+    filled: Flags,
 ) -> None:
     values, references = np.empty(8), np.empty(8)
     bits = np.empty(8, dtype=np.int64)
@@ -178,10 +173,7 @@ def _prepare(
 def is_logarithmic(transform: str) -> bool:
     """Whether features and target are logarithms.
 
-    Raises
-    ------
-    UserError
-        For a transform that is not one of `TRANSFORMS`.
+    Raises UserError for a transform that is not one of `TRANSFORMS`.
     """
     if transform not in TRANSFORMS:
         raise UserError(f"transform {transform!r} is unknown, choose {' or '.join(TRANSFORMS)}")

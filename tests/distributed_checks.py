@@ -26,15 +26,14 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.assembly.sparse import assembled
 from solver.assembly.system import Layout, assemble
+from solver.distribution.collective import receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh, distribute
-from solver.distribution.messages import receive_arrays, send_arrays
 from solver.files.modes_file import write_modes
 from solver.hcms import schedule as scheduling
 from solver.hcms.condense import INTERFACES
 from solver.hcms.counts import Tally
 from solver.hcms.merge import Reduced, all_pairs
-from solver.hcms.scalapack import grid_side
-from solver.hcms.shared import shared_pairs
+from solver.hcms.scalapack import grid_side, shared_pairs
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver
 from solver.linear.multigrid import Multigrid

@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dataset_gen import summary
 from dataset_gen.__main__ import main
 from dataset_gen.commands import generate as program
+from dataset_gen.commands import inspect as summary
 from dataset_gen.generate import generate
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR

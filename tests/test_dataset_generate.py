@@ -22,8 +22,7 @@ from dataset_gen.journal import Journal, journal_of
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, SAMPLED, fit, fit_samples
 from dataset_gen.settings import ShardOptions, settings_of
 from dataset_gen.shards import origin_of
-from dataset_gen.tasks import ROW, ShardPlan
-from dataset_gen.workers import in_this_process
+from dataset_gen.tasks import ROW, ShardPlan, in_this_process
 from tests.patience import HANG_SECONDS, wait_for
 from tests.programs import checkout_environment
 from tests.shard_files import read_shard

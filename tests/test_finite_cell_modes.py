@@ -18,7 +18,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES
-from solver.refinement.options import ALLOWED_DISTANCE
+from solver.refinement.errors import ALLOWED_DISTANCE
 from solver.response.points import interpolation
 from solver.verification.comparison import compare_files
 from studies.accuracy import domains

@@ -12,8 +12,7 @@ from forests import coarsen, coarsen_with_derivatives
 from forests.layout import pack, positions, rounded_down
 from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Model
 from forests.scaling import FEATURES, LOG_FLOOR, LOG_VOID, PATTERNS, TRANSFORMS, prepare
-from forests.training.join import join
-from forests.training.leaves import Leaves
+from forests.training.leaves import Leaves, join
 from forests.training.structure import flatten
 from tests.forests_reference import (
     cell_order_reference,

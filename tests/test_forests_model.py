@@ -16,11 +16,10 @@ from dataset_gen.settings import ShardOptions
 from forests import coarsen, load_model, save_model
 from forests import default as default_forests
 from forests.baselines import average, galerkin
+from forests.commands.inspect import as_text, describe
 from forests.model import FILLED, HIGH, KIND, LOW, SCHEMA, VOID, Forests
 from forests.scaling import PATTERNS
-from forests.summary import as_text, describe
-from forests.training.join import join
-from forests.training.leaves import Leaves
+from forests.training.leaves import Leaves, join
 from forests.training.structure import tree_of
 from forests.training.train import TrainingOptions
 from tests.small_forests import train

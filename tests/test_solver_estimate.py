@@ -17,16 +17,14 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.choice import make_coarsening
 from solver.files.modes_file import FINE_TAKEN, read_modes
-from solver.refinement import coarse_or_fine, work
+from solver.refinement import coarse_or_fine, weighing
 from solver.refinement.coarse_or_fine import solve_coarsened
-from solver.refinement.energies import element_energies, fine_energies
-from solver.refinement.errors import ExpectedErrors
-from solver.refinement.estimate import estimate_errors, mean_shares
+from solver.refinement.errors import ALLOWED_ERROR, ExpectedErrors, RefinementOptions
+from solver.refinement.estimate import element_energies, estimate_errors, fine_energies, mean_shares
 from solver.refinement.inverse_iteration import InverseIteration
 from solver.refinement.model_solver import SolveByOptions
-from solver.refinement.options import ALLOWED_ERROR, RefinementOptions
 from solver.refinement.refined_model import RefinedModel
-from solver.refinement.work import analysis_work, is_followed, variation
+from solver.refinement.weighing import analysis_work, is_followed, variation
 from tests import solids
 from tests.rank_counts import SEVERAL, TO_THREE
 
@@ -165,8 +163,8 @@ def script_with(path, clearly, refined):
     path.write_text(
         "import sys\n"
         "from solver.__main__ import main\n"
-        "from solver.refinement import work\n"
-        f"work.CLEARLY, work.REFINED = {clearly}, {refined}\n"
+        "from solver.refinement import weighing\n"
+        f"weighing.CLEARLY, weighing.REFINED = {clearly}, {refined}\n"
         "sys.exit(main(sys.argv[1:]))\n"
     )
     return path
@@ -177,8 +175,8 @@ def head(tmp_path_factory):
     """Modes file of the head with some blocks fine, whatever that costs."""
     out = str(tmp_path_factory.mktemp("head") / "modes.h5")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work, "CLEARLY", 10.0)
-        patch.setattr(work, "REFINED", 10.0)
+        patch.setattr(weighing, "CLEARLY", 10.0)
+        patch.setattr(weighing, "REFINED", 10.0)
         main(["modes", *HEAD, "--out", out])
     return out
 

@@ -10,8 +10,7 @@ from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, assemble
 from solver.correction.error_correction import correct
-from solver.correction.lanczos import lanczos
-from solver.correction.starting_block import mixed
+from solver.correction.lanczos import lanczos, mixed
 from solver.distribution.local_mesh import distribute
 from solver.linear import Approximate, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz

@@ -79,10 +79,10 @@ def test_coarse_moduli_may_be_zero_but_not_negative():
     moduli = model.young.copy()
     moduli[0, :2] = 0.0
     exact = solids.dense_eigenvalues(replace(model, young=moduli))[6:20]
-    assert np.abs(prepared.solve_coarse(moduli).values[6:] / exact - 1.0).max() < 1e-5
+    assert np.abs(prepared.solve(moduli, coarsened=True).values[6:] / exact - 1.0).max() < 1e-5
     for wrong, sentence in ((-moduli, "are negative"), (moduli[:, 0], r"expected \(36, 8\)")):
         with pytest.raises(UserError, match=f"coarse moduli: .*{sentence}"):
-            prepared.solve_coarse(wrong)
+            prepared.solve(wrong, coarsened=True)
 
 
 @pytest.mark.mpi

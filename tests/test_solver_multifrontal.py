@@ -9,7 +9,6 @@ from carillon.errors import ConvergenceError
 from carillon.fem.model import fine_model
 from solver.assembly.node_rows import NodeRows, Pattern
 from solver.linear import multifrontal
-from solver.linear.dissection import dissect
 from solver.linear.multifrontal import Factor
 from solver.linear.plan import Plan
 from tests import solids
@@ -98,8 +97,8 @@ def test_every_entry_is_in_the_first_front_that_has_its_row_or_column(mesh):
 def test_dissection_saves_work():
     _, plan, planes = problem(solids.box_mesh(12, 12, 12))
     none = np.zeros(len(planes) + 1, dtype=np.int64)
-    whole = dissect(planes, none, none[:0], leaf_nodes=10**6)
-    assert plan.fronts.solve_flops() < 0.3 * whole.solve_flops()
+    whole = Plan(planes, none, none[:0], leaf_nodes=10**6)
+    assert plan.operations_of_solve < 0.3 * whole.operations_of_solve
 
 
 def test_a_factorisation_that_does_not_fit_is_refused(monkeypatch):

@@ -21,7 +21,7 @@ from solver.distribution.local_mesh import distribute
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver, iterative
-from solver.subspace.spectrum import clusters
+from solver.subspace.weyl import clusters
 from solver.verification.matching import subspace_angles
 from studies.accuracy import domains
 from studies.accuracy.ritz import free_eigenvalues

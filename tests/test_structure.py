@@ -48,7 +48,7 @@ ARROWS = {
     #
     "dataset_gen.objectives": "",
     "dataset_gen": "dataset_gen.objectives",
-    "dataset_gen.commands": "dataset_gen",
+    "dataset_gen.commands": "dataset_gen dataset_gen.objectives",
     #
     "forests": "",
     "forests.training": "dataset_gen dataset_gen.objectives forests",

@@ -16,12 +16,7 @@ from carillon.errors import UserError
 from dataset_gen.objectives.calibration import default_calibration
 
 if TYPE_CHECKING:
-    from dataset_gen.objectives.fitting import (
-        Fits,
-        fit,
-        fit_samples,
-        orientations,
-    )
+    from dataset_gen.objectives.fitting import Fits, fit, fit_samples, orientations
 
 __all__ = [
     "DATASET_OBJECTIVES",
@@ -38,26 +33,15 @@ __all__ = [
     "require_poisson",
 ]
 
-OBJECTIVES = (
-    "energy",
-    "chen2015",
-    "inertial",
-    "oversampled",
-    "hybrid",
-    "factored",
-    "calibrated",
-)
+OBJECTIVES = ("energy", "chen2015", "inertial", "oversampled", "hybrid", "factored", "calibrated")
 """Names of all objectives, each that of its module."""
-
 SAMPLED = "sampled-energy"
 """`energy` by its printed evaluator, forces drawn anew for every sample of a dataset.
 
 It fits datasets alone: what it answers for a block depends on the sample's number as well.
 """
-
 DATASET_OBJECTIVES = (*OBJECTIVES, SAMPLED)
 """Names of all that a dataset can be fitted by."""
-
 DEFAULT_OBJECTIVE = "calibrated"
 """The one with the best spectra, see the study that `snakemake objectives` makes."""
 
@@ -88,9 +72,5 @@ def require_poisson(poisson: float) -> None:
 
 
 __getattr__ = lazy_exports.exports(
-    __name__,
-    dict.fromkeys(
-        ("Fits", "fit", "fit_samples", "orientations"),
-        "fitting",
-    ),
+    __name__, dict.fromkeys(("Fits", "fit", "fit_samples", "orientations"), "fitting")
 )

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array, Flags
 from carillon.numerics.simd import (
     LANES,
     Vector,
@@ -21,10 +20,8 @@ from dataset_gen.objectives.compiled import compiled
 
 EXCHANGES = 12
 """Exchanges of all wrong unknowns at once before the slow method that cannot cycle takes over."""
-
 MAX_ITERATIONS = 200
 """Unknowns that enter in the slow method; eight are usual."""
-
 TOLERANCE = 1e-12
 """Slope that counts as zero, as a share of the largest right-hand side."""
 
@@ -118,7 +115,7 @@ def _grow(matrix: Array, vector: Array, work: tuple[Array, Array, Array], lane: 
 
 
 @compiled
-def _minimise(matrix: Array, vector: Array, x: Array, settled: NDArray[np.bool_]) -> None:
+def _minimise(matrix: Array, vector: Array, x: Array, settled: Flags) -> None:
     """Non-negative minimisers x (8) of the problems in the lanes."""
     free, factor, other, changes = empty(8), empty(64), empty(8), empty(1)
     largest = spread(0.0)
@@ -139,9 +136,7 @@ def _minimise(matrix: Array, vector: Array, x: Array, settled: NDArray[np.bool_]
 
 
 @compiled
-def minimise_above(
-    matrices: Array, vectors: Array, lower: Array
-) -> tuple[Array, NDArray[np.bool_]]:
+def minimise_above(matrices: Array, vectors: Array, lower: Array) -> tuple[Array, Flags]:
     """Minimise `x^T A x / 2 - b^T x` subject to `x >= lower`, one problem per row.
 
     Parameters

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import ALL_FILLED, galerkin_moduli
-from carillon.fem.element import Array
 from dataset_gen.objectives import oversampled
 from dataset_gen.objectives.calibration import Calibration, default_calibration
 from dataset_gen.objectives.factored import held_unit_moduli, unit_block, unit_moduli
@@ -29,10 +29,7 @@ def contrast_logs(young: Array, held: Array, unit: Array, held_unit: Array) -> t
 
     `unit` are the blocks 1_p, (n, 8) or one for all; `held` and `held_unit` the moduli O of both.
     """
-    return (
-        np.log(held / held_unit),
-        np.log(galerkin_moduli(young) / galerkin_moduli(unit)),
-    )
+    return (np.log(held / held_unit), np.log(galerkin_moduli(young) / galerkin_moduli(unit)))
 
 
 def combine(

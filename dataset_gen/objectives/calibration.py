@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.errors import UserError
-from carillon.fem.element import Array
 
 FILE = "calibration.json"
 """Beside this module; `carillon calibrate` of version 0.1 wrote it."""
@@ -50,10 +50,7 @@ class Calibration:
 def parse(content: Mapping[str, Any]) -> Calibration:
     """Calibration from the content of its JSON file.
 
-    Raises
-    ------
-    UserError
-        If an entry is missing or not a positive number.
+    Raises UserError if an entry is missing or not a positive number.
     """
     try:
         factors = np.ones((256, 8))

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import CORNER_NODES, degrees_of_freedom
-from carillon.fem.element import Array
 from carillon.numerics.simd import LANES, empty, spread, store
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
@@ -39,8 +39,8 @@ from dataset_gen.objectives.kernel import (
     multiply,
     solve_lower,
     solve_upper,
-    transpose,
     weigh,
+    whiten,
     write_equations,
 )
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
@@ -60,8 +60,6 @@ class Corners(NamedTuple):
 
     Attributes
     ----------
-    block
-        The free block.
     loads : flat (a, 18)
         C^T Z: forces dual to the straining motions Z of the corners.
     strains : flat (48, 18)
@@ -141,9 +139,7 @@ def _form_equations(corners: Corners, young: Array, equations: NormalEquations) 
         lower_tiles(motions, MOTIONS, small)
         factorise(DENSE, small)
         solve_lower(DENSE, small, motions, MOTIONS)
-        solve_lower(DENSE, small, energies, MOTIONS)
-        transpose(energies, MOTIONS)
-        solve_lower(DENSE, small, energies, MOTIONS)
+        whiten(small, energies)
         all_forms(motions, energies, MOTIONS, corners.strains, forms)
         trace, square = flexibility_norms(corners.block, tiles)
         store(forms, 9 * last - 1, trace)

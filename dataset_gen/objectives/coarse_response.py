@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from carillon.numerics.simd import LANES, empty, load, root, spread, store
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.compiled import compiled
-from dataset_gen.objectives.descent import CURVATURE, GRADIENT
+from dataset_gen.objectives.descent import CURVATURE, GRADIENT, HESSIAN, VALUE
 from dataset_gen.objectives.elimination import Sum, elimination_of, lower_tiles_of, sum_of
 from dataset_gen.objectives.free_block import FreeBlock, free_block_of
 from dataset_gen.objectives.kernel import (
@@ -40,8 +40,6 @@ class Coarse(NamedTuple):
 
     Attributes
     ----------
-    block
-        The free block.
     basis : flat (a, 18)
         V on the active nodes in the order of elimination.
     stiffness
@@ -140,12 +138,18 @@ def respond(coarse: Coarse, logs: Array, response: CoarseResponse) -> None:
 
 
 @compiled
-def write_curvature(response: CoarseResponse, slope: Array, out: Array) -> None:
-    """Write what the second derivatives of B in log E add to an objective's Hessian.
+def write_derivatives(response: CoarseResponse, gram: Array, slope: Array, out: Array) -> None:
+    """Write value, gradient and Hessian in log E of an objective that is a square in B.
 
-    With M (18, 18) the objective's derivative in B, they add `2 <R_p M R_q^T, Y_p Y_q^T>`, Y_q^T
-    being columns of `scaled`, and on the diagonal the gradient, which `out` already has.
+    `gram` (9, 9) are the products of its derivatives by -log E_q, and in the last row of its root.
+    With M = `slope` (18, 18) the objective's derivative in B, the second derivatives of B add
+    `2 <R_p M R_q^T, Y_p Y_q^T>`, Y_q^T being columns of `scaled`, and on the diagonal the gradient.
     """
+    store(out, VALUE, load(gram, 80))
+    for p in range(8):
+        store(out, GRADIENT + p, spread(-2.0) * load(gram, 72 + p))
+        for q in range(p + 1):
+            store(out, HESSIAN + 8 * p + q, spread(2.0) * load(gram, 9 * p + q))
     bent, forces, strains = empty(MOTIONS * STRAINS), empty(6 * STRAINS), empty(6 * STRAINS)
     strained, scaled = response.strained, response.scaled
     multiply(bent, (slope, 0, MOTIONS, 1), (strained, 0, 1, STRAINS), MOTIONS, STRAINS, MOTIONS)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from carillon.numerics.simd import LANES, Vector, empty, larger, load, spread, store, where_less
 from dataset_gen.objectives.bounded import solve_free
 from dataset_gen.objectives.compiled import compiled
@@ -24,21 +24,16 @@ STEP_TOLERANCE = 1e-6
 
 It only counts while the damping is at most `LIGHT`, when the step is close to Newton's.
 """
-
 LIGHT = 1e-2
 
 FIRST_DAMPING, LEAST_DAMPING, REFUSED = 1e-2, 1e-6, 1e-3
 """Share of the diagonal added to the Hessian: at the start, at least, and after a refused step."""
-
 LARGEST_STEP = 1.0
 """Longest step in log E of Gauss and Newton."""
-
 NEAR = 0.2
 """Step of Gauss and Newton from which on all of the Hessian is used; the longest such step."""
-
 FIRST_SHIFT, SHIFTS = 3e-5, 16
 """First shift of a Hessian that is not positive, and how often it is doubled until it is."""
-
 SLACK = 1e-12
 """Rise of the cost taken for rounding, as a share of the objective's scale."""
 

@@ -13,12 +13,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import CELL_NODES, degrees_of_freedom
-from carillon.fem.element import Array
-
-Indices = NDArray[np.int64]
 
 TILE = 9
 """Numbers of a tile, stored row by row."""
@@ -27,9 +24,9 @@ TILE = 9
 class Links(NamedTuple):
     """Tiles that link each node to others: those of node i are start[i]..start[i + 1]."""
 
-    start: Indices
-    node: Indices
-    tile: Indices
+    start: Index
+    node: Index
+    tile: Index
 
 
 class FactorStructure(NamedTuple):
@@ -51,11 +48,11 @@ class FactorStructure(NamedTuple):
 
     rows: Links
     columns: Links
-    diagonal: Indices
-    start: Indices
-    updated: Indices
-    left: Indices
-    right: Indices
+    diagonal: Index
+    start: Index
+    updated: Index
+    left: Index
+    right: Index
 
 
 class Sum(NamedTuple):
@@ -71,8 +68,8 @@ class Sum(NamedTuple):
         Its fixed tile.
     """
 
-    start: Indices
-    weight: Indices
+    start: Index
+    weight: Index
     values: Array
 
 
@@ -88,17 +85,15 @@ class SymbolicFactorisation:
         Whether two of the nodes touch a common filled cell.
     filled : (n, n)
         Whether the factor has a tile between them.
-    factor
-        Structure of the factor.
     """
 
-    dofs: Indices
-    linked: NDArray[np.bool_]
-    filled: NDArray[np.bool_]
+    dofs: Index
+    linked: Flags
+    filled: Flags
     factor: FactorStructure
 
 
-def _order(cells: NDArray[np.int64]) -> list[int]:
+def _order(cells: Index) -> list[int]:
     """Nodes of the cells (f, 8) by least degree in what is left of the graph."""
     neighbours: dict[int, set[int]] = {}
     for nodes in cells.tolist():
@@ -128,7 +123,7 @@ def elimination_of(mask: int) -> SymbolicFactorisation:
     return SymbolicFactorisation(degrees_of_freedom(nodes), linked, filled, factor_of(filled))
 
 
-def factor_of(filled: NDArray[np.bool_]) -> FactorStructure:
+def factor_of(filled: Flags) -> FactorStructure:
     """Structure of a factor that has the lower tiles of `filled` (n, n)."""
     lower = np.tril(filled)
     number = np.zeros(filled.shape, dtype=np.int64)
@@ -151,7 +146,7 @@ def factor_of(filled: NDArray[np.bool_]) -> FactorStructure:
     )
 
 
-def lower_links(linked: NDArray[np.bool_]) -> Links:
+def lower_links(linked: Flags) -> Links:
     """Links of the lower tiles of a matrix, the diagonal included, stored row by row."""
     lower = np.tril(linked)
     number = np.zeros(linked.shape, dtype=np.int64)
@@ -159,23 +154,23 @@ def lower_links(linked: NDArray[np.bool_]) -> Links:
     return _links(lower, number)
 
 
-def _links(linked: NDArray[np.bool_], number: NDArray[np.int64]) -> Links:
+def _links(linked: Flags, number: Index) -> Links:
     node = [np.flatnonzero(row) for row in linked]
     return Links(_starts(node), np.concatenate(node), number[linked])
 
 
-def _starts(parts: list[Any]) -> Indices:
+def _starts(parts: list[Any]) -> Index:
     return np.cumsum([0, *map(len, parts)])
 
 
-def lower_tiles_of(matrices: Array, linked: NDArray[np.bool_]) -> Array:
+def lower_tiles_of(matrices: Array, linked: Flags) -> Array:
     """Tiles (w, t, 9) of symmetric matrices (w, 3 n, 3 n) in the lower half of `linked`."""
     count = matrices.shape[1] // 3
     tiles = matrices.reshape(-1, count, 3, count, 3).swapaxes(2, 3)
     return tiles[:, np.tril(linked)].reshape(len(matrices), -1, TILE)
 
 
-def sum_of(weights: Sequence[int] | Indices, tiles: Array) -> Sum:
+def sum_of(weights: Sequence[int] | Index, tiles: Array) -> Sum:
     """Sum of tiles (w, t, 9), each with its number of a weight; zero tiles are left out."""
     used = tiles.any(axis=2).T
     term = np.nonzero(used)

@@ -12,9 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array, Flags
 from carillon.numerics.simd import LANES, Vector, empty, load, spread, store
 from dataset_gen.objectives.coarse_response import (
     Coarse,
@@ -22,7 +21,7 @@ from dataset_gen.objectives.coarse_response import (
     coarse_of,
     empty_response,
     respond,
-    write_curvature,
+    write_derivatives,
 )
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import (
@@ -58,7 +57,6 @@ from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, referen
 
 MODULUS_CEILING = 10.0
 """Upper bound of every coarse modulus, as a multiple of the block's largest fine modulus."""
-
 LOG_RIDGE = 1e-6
 """Pull of log E towards log E0, as a share of the fine energies' mean square."""
 
@@ -117,12 +115,7 @@ def _evaluate(
     for n in range(MOTIONS**2):
         store(slope, n, spread(4.0) * load(slope, n))
     add_diagonal(slope, MOTIONS, spread(2.0) * error)
-    store(out, VALUE, load(gram, 80))
-    for p in range(8):
-        store(out, GRADIENT + p, spread(-2.0) * load(gram, 72 + p))
-        for q in range(p + 1):
-            store(out, HESSIAN + 8 * p + q, spread(2.0) * load(gram, 9 * p + q))
-    write_curvature(response, slope, out)
+    write_derivatives(response, gram, slope, out)
 
 
 @compiled
@@ -141,7 +134,7 @@ def _add_pull(origin: Array, weight: Vector, logs: Array, out: Array) -> None:
 @compiled
 def _fit_rows(
     coarse: Coarse, young: Array, starts: Array, bounds: tuple[float, float]
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Flags]:
     """Logarithms (n, 8) of the moduli, residuals (n,) and convergence (n,)."""
     count = len(young)
     logs, residuals = np.empty((count, 8)), np.empty(count)

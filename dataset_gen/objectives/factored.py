@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from dataset_gen.objectives import hybrid, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
 

@@ -8,17 +8,13 @@ from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
 from carillon.fem.block import pattern_images, symmetries, void_patterns
-from carillon.fem.element import DEFAULT_POISSON, Array
-from dataset_gen.objectives import (
-    SAMPLED,
-    require_objective,
-    require_poisson,
-    sampled_energy,
-)
+from carillon.fem.element import DEFAULT_POISSON
+from dataset_gen.objectives import SAMPLED, require_objective, require_poisson, sampled_energy
 
 
 def module_of(objective: str) -> ModuleType:
@@ -41,7 +37,7 @@ class Fits(NamedTuple):
 
     moduli: Array
     residual: Array
-    converged: NDArray[np.bool_]
+    converged: Flags
 
 
 def _require_blocks(young: Array) -> None:
@@ -55,7 +51,7 @@ def _require_blocks(young: Array) -> None:
 
 
 @cache
-def orientations() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def orientations() -> tuple[Index, Index]:
     """Least image (256,) of each void pattern under the symmetries, and the one used (256, 8).
 
     Cell j of the pattern is cell [mask, j] of its image.
@@ -67,6 +63,9 @@ def orientations() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     """Fit the coarse moduli of many blocks.
 
+    Raises UserError for an unknown objective, a bad shape, a negative or non-finite modulus, an
+    all-void block.
+
     Parameters
     ----------
     objective
@@ -75,11 +74,6 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
         Fine moduli in bit order, any unit, 0 where a cell is void.
     poisson
         Poisson's ratio of all cells.
-
-    Raises
-    ------
-    UserError
-        For an unknown objective, a bad shape, a negative or non-finite modulus, an all-void block.
 
     Notes
     -----
@@ -115,12 +109,7 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
 def fit_samples(objective: str, e: Array, seed: int, first: int, poisson: float) -> Fits:
     """Fit the samples `first`, `first` + 1, ... of a dataset, see `fit`.
 
-    Parameters
-    ----------
-    objective
-        Name in `dataset_gen.objectives.DATASET_OBJECTIVES`.
-    seed
-        Of the dataset; what is drawn for a fit depends on it and on the sample's number alone.
+    What is drawn for a fit depends on the dataset's `seed` and on the sample's number alone.
     """
     if objective != SAMPLED:
         return fit(objective, e, poisson)

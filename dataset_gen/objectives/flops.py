@@ -15,7 +15,6 @@ from dataset_gen.objectives.kernel import MOTIONS, STRAINS
 
 INVERTED_ROOT = 28
 """Operations on a tile of the diagonal: three roots, three divisions and what goes with them."""
-
 TILE_PRODUCT = 2 * 27
 """Operations of the product of two tiles."""
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import qr
 
+from carillon.arrays import Array
 from carillon.fem.block import cell_stiffness
-from carillon.fem.element import Array
 from carillon.numerics.simd import Vector, empty, load, spread, store
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.compiled import compiled
@@ -41,8 +41,6 @@ class FreeBlock(NamedTuple):
 
     Attributes
     ----------
-    factor
-        Structure of the factor.
     stiffness
         K with springs of the mean modulus.
     null : flat (a, k)

@@ -5,8 +5,8 @@ A block inside the solid is held by its neighbours; one at a void surface moves 
 
 from __future__ import annotations
 
+from carillon.arrays import Array
 from carillon.fem.block import ALL_FILLED
-from carillon.fem.element import Array
 from dataset_gen.objectives import inertial, oversampled
 from dataset_gen.objectives.quadratic import PatternFits
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from carillon.numerics.simd import LANES, empty
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
@@ -46,8 +46,6 @@ class InertialTables(NamedTuple):
 
     Attributes
     ----------
-    block
-        The free block.
     loads : flat (a, 24)
         Inertial forces of the trilinear motions.
     to_corners : flat (18, a)

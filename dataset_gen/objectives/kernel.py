@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from carillon.numerics.simd import (
     LANES,
     Vector,
@@ -31,22 +31,16 @@ from dataset_gen.objectives.elimination import TILE, FactorStructure, Links, Sum
 
 Operand = tuple[Array, int, int, int]
 """Array, first entry, stride along the rows or columns, stride along the sum."""
-
 MOTIONS = 18
 """Straining motions of the coarse element: 24 less 6 rigid ones."""
-
 STRAINS = 48
 """Strain components of the coarse element: six at each of eight quadrature points."""
-
 COLUMNS = 6
 """Columns of right-hand sides come in multiples of so many, which panels divide evenly."""
-
 MEAN, WEIGHTS = 8, 9
 """Weights of a block: the moduli 0..7, the mean of the filled cells'; how many there are."""
-
 DENSE = factor_of(np.ones((MOTIONS // 3, MOTIONS // 3), dtype=bool))
 """Structure of the factor of a matrix on the straining motions, tiled as if these were nodes."""
-
 LOWER = TILE * (MOTIONS // 3) * (MOTIONS // 3 + 1) // 2
 """Numbers of the lower tiles of such a matrix."""
 
@@ -262,6 +256,14 @@ def lower_tiles(matrix: Array, size: int, tiles: Array) -> None:
             tile = load_tile((matrix, size * i + j, size, 1), 3, 3)
             store_tile((tiles, n, 3, 1), tile)
             n += TILE
+
+
+@compiled
+def whiten(factor: Array, energies: Array) -> None:
+    """Replace symmetric `energies` (18, 18) by L^-1 E L^-T, L being the `factor` as tiles."""
+    solve_lower(DENSE, factor, energies, MOTIONS)
+    transpose(energies, MOTIONS)
+    solve_lower(DENSE, factor, energies, MOTIONS)
 
 
 # A symmetric form on the fields is kept as its tiles below the diagonal, then those on it, then its

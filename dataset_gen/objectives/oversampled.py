@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
-from carillon.fem.element import CORNERS, Array, shape_functions, uniform_stiffness
+from carillon.fem.element import CORNERS, shape_functions, uniform_stiffness
 from carillon.numerics.simd import LANES, empty, spread
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
@@ -45,8 +46,8 @@ from dataset_gen.objectives.kernel import (
     solve_upper,
     symmetrise,
     trace,
-    transpose,
     weigh,
+    whiten,
     write_equations,
 )
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
@@ -63,7 +64,6 @@ RIGID_SHARE = 1e-8
 
 Positive definite even for a single filled cell, which one prescribed field leaves rigid.
 """
-
 PATCH_NODES = np.array([[x, y, z] for z in range(5) for y in range(5) for x in range(5)])
 
 
@@ -72,8 +72,6 @@ class Patch(NamedTuple):
 
     Attributes
     ----------
-    factor
-        Structure of the factor.
     held
         Stiffness of the patch from each octant.
     loads : (a, 18)
@@ -188,9 +186,7 @@ def _whiten(energies: Array, motions: Array) -> None:
     add_diagonal(energies, MOTIONS, spread(0.0) - more)
     factorise(DENSE, factor)
     solve_lower(DENSE, factor, motions, MOTIONS)
-    solve_lower(DENSE, factor, energies, MOTIONS)
-    transpose(energies, MOTIONS)
-    solve_lower(DENSE, factor, energies, MOTIONS)
+    whiten(factor, energies)
 
 
 def normal_equations(young: Array, mask: int, poisson: float) -> NormalEquations:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import (
     COARSE_EDGE,
     NODES,
@@ -20,7 +20,6 @@ from carillon.fem.block import (
 from carillon.fem.element import (
     CORNERS,
     GAUSS_POINTS,
-    Array,
     elasticity_matrix,
     rigid_motions,
     shape_gradients,
@@ -56,8 +55,8 @@ class VoidPattern:
         Orthonormal motions without strain; k > 6 where cells hinge on edges or corners.
     """
 
-    cells: NDArray[np.int64]
-    dofs: NDArray[np.int64]
+    cells: Index
+    dofs: Index
     stiffness: Array
     mass: Array
     interpolation: Array
@@ -65,7 +64,7 @@ class VoidPattern:
     rigid: Array
     null: Array
 
-    def positions(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+    def positions(self, dofs: Index) -> Index:
         """Where degrees of freedom of the block are among the active ones."""
         return np.searchsorted(self.dofs, dofs)
 

@@ -6,18 +6,15 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array, Flags
 from dataset_gen.objectives.bounded import minimise_above
 from dataset_gen.objectives.flops import count
 
 RIDGE = 1e-3
 """Pull towards E0, as a share of the mean diagonal of the normal matrix."""
-
 REFERENCE_FLOOR = 1e-2
 """E0 is at least this share of the block's largest fine modulus."""
-
 MODULUS_FLOOR = 1e-2
 """Lower bound of every coarse modulus, as a share of the block's largest fine modulus."""
 
@@ -37,7 +34,7 @@ class PatternFits(NamedTuple):
 
     moduli: Array
     residual: Array
-    converged: NDArray[np.bool_]
+    converged: Flags
 
 
 class NormalEquations(NamedTuple):

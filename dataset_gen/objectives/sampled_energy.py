@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import void_patterns
-from carillon.fem.element import DEFAULT_POISSON, Array
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.numerics.simd import LANES, add_product, empty, load, spread, store, store_tile, zeros
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.coarse_response import (
@@ -20,12 +21,10 @@ from dataset_gen.objectives.coarse_response import (
     coarse_of,
     empty_response,
     respond,
-    write_curvature,
+    write_derivatives,
 )
 from dataset_gen.objectives.compiled import compiled
 from dataset_gen.objectives.descent import (
-    GRADIENT,
-    HESSIAN,
     MAX_ITERATIONS,
     VALUE,
     begin,
@@ -53,10 +52,8 @@ from dataset_gen.objectives.quadratic import MODULUS_FLOOR, PatternFits, referen
 
 DIRECTIONS = 1000
 """Force directions of one fit (section 8.1)."""
-
 MAGNITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Five magnitudes in each direction; they only rescale the energies."""
-
 
 FORCES = (0, 0, 0, 1)
 """First counter of the forces of a sample, words from the least on; moduli are drawn from zero."""
@@ -177,12 +174,7 @@ def _evaluate(
     multiply(slope, left, right, MOTIONS, MOTIONS, columns)
     _sum_lanes(gram)
     _sum_lanes(slope)
-    store(out, VALUE, load(gram, 80))
-    for p in range(8):
-        store(out, GRADIENT + p, spread(-2.0) * load(gram, 72 + p))
-        for q in range(p + 1):
-            store(out, HESSIAN + 8 * p + q, spread(2.0) * load(gram, 9 * p + q))
-    write_curvature(response, slope, out)
+    write_derivatives(response, gram, slope, out)
 
 
 @compiled

@@ -11,11 +11,11 @@ import time
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.paths import require_writable
-from carillon.parameters.command_line import reader
+from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import Number
-from forests.commands.training import add_training, training_of
+from forests.commands.training import add_training
 from forests.training.dataset import open_dataset
-from forests.training.train import grow_trees, parameters_of
+from forests.training.train import TrainingOptions, grow_trees, parameters_of
 from forests.training.tree_file import save_tree
 
 
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Grow one tree and write it."""
     require_writable(arguments.out, arguments.datasets)
-    training = training_of(arguments)
+    training = collect(TrainingOptions, arguments)
     job = arguments.tree
     if job not in training.jobs:
         raise UserError(f"tree {job} of 2 x {training.trees}: expected 0 to {training.jobs[-1]}")

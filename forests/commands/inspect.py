@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
+from typing import Any
 
-from forests import summary
 from forests.default import default_path
+from forests.model import load_model
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,5 +19,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Read the forests and print their summary."""
-    description = summary.describe(default_path() if arguments.file is None else arguments.file)
-    print(json.dumps(description, indent=2) if arguments.json else summary.as_text(description))
+    description = describe(default_path() if arguments.file is None else arguments.file)
+    print(json.dumps(description, indent=2) if arguments.json else as_text(description))
+
+
+def describe(path: str | Path) -> dict[str, Any]:
+    """Validate the model at `path` and summarise it.
+
+    Raises UserError, see `forests.model.load_model`.
+    """
+    model = load_model(path)
+    return {
+        "path": str(path),
+        "objective": model.objective,
+        "poisson": model.poisson,
+        "transform": model.transform,
+        "trees": model.forests.trees,
+        "nodes": len(model.forests.nodes),
+        "leaves": len(model.forests.leaves),
+        "memory_bytes": model.nbytes,
+        "scores": model.scores,
+        "provenance": model.provenance,
+    }
+
+
+def as_text(summary: dict[str, Any]) -> str:
+    """The result of `describe` as lines."""
+    lines = [
+        f"{summary['path']}: forests of objective {summary['objective']}, "
+        f"Poisson's ratio {summary['poisson']}, {summary['transform']} features",
+        f"2 x {summary['trees']} trees, {summary['leaves']:,} leaves, "
+        f"{summary['memory_bytes'] / 1e6:.1f} MB in memory",
+    ]
+    lines += [f"{name:<28}{value:.6g}" for name, value in summary["scores"].items()]
+    lines.append(f"commit {summary['provenance'].get('commit', 'unknown')}")
+    return "\n".join(lines)

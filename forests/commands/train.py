@@ -9,8 +9,9 @@ import argparse
 
 from carillon.command_line.progress import say
 from carillon.files.paths import require_writable
+from carillon.parameters.command_line import collect
 from carillon.processes.ranks import world
-from forests.commands.training import add_training, add_workers, training_of
+from forests.commands.training import add_training, add_workers
 from forests.model import save_model
 from forests.training.dataset import Dataset, open_dataset
 from forests.training.ranks import Ranks
@@ -39,7 +40,7 @@ Grown = tuple[dict[int, Tree], float]
 
 def _opened(arguments: argparse.Namespace) -> tuple[TrainingOptions, Dataset, Grown | None]:
     require_writable(arguments.out, [*arguments.datasets, *(arguments.structure or [])])
-    training = training_of(arguments)
+    training = collect(TrainingOptions, arguments)
     dataset = open_dataset(arguments.datasets)
     if arguments.structure is None:
         return training, dataset, None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from carillon.parameters.command_line import add_options, collect, reader
+from carillon.parameters.command_line import add_options, reader
 from carillon.parameters.quantities import Workers
 from forests.training.train import TrainingOptions
 
@@ -18,8 +18,3 @@ def add_training(parser: argparse.ArgumentParser) -> None:
 def add_workers(parser: argparse.ArgumentParser, meaning: str = "threads") -> None:
     """Add the number of threads of a training to a command."""
     parser.add_argument("--workers", type=reader(Workers), default=1, help=meaning)
-
-
-def training_of(arguments: argparse.Namespace) -> TrainingOptions:
-    """The parameters that `add_training` has read."""
-    return collect(TrainingOptions, arguments)

@@ -13,18 +13,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array, Flags, Index
 from dataset_gen.sampling import HYPERCUBE
 from dataset_gen.settings import Settings
 from dataset_gen.shards import PIECE_ROWS, Shard, in_order, iterate_shard, read_settings
+from forests.scaling import TRANSFORMS, Features, prepare
+from forests.training.structure import Rows
 
 HELD_OUT = 20
 """Every so many-th sample is not trained on but scores the model..."""
-
 MOST_HELD_OUT = 100_000
 """...up to so many."""
+STUDIED = ("ratio-log", "bounded")
+"""Transforms that can be trained to compare them, but not evaluated: the paper's ratios r with the
+logarithm of the target, and r brought to -1..1 as (r - 1) / (r + 1) with the same target."""
 
 
 class Samples(NamedTuple):
@@ -32,9 +35,9 @@ class Samples(NamedTuple):
 
     young: Array
     moduli: Array
-    position: NDArray[np.int64]
+    position: Index
 
-    def where(self, chosen: NDArray[np.bool_]) -> Samples:
+    def where(self, chosen: Flags) -> Samples:
         """The chosen (n,) ones."""
         return Samples(self.young[chosen], self.moduli[chosen], self.position[chosen])
 
@@ -78,7 +81,7 @@ class Dataset:
                     position += offset - self.settings[number].start
                     yield Samples(piece.fine, piece.coarse, position).where(piece.converged)
 
-    def is_held_out(self, position: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def is_held_out(self, position: Index) -> Flags:
         """Which samples (n,) are not trained on: evenly spread, at most `MOST_HELD_OUT`."""
         every = max(HELD_OUT, -(-self.count // MOST_HELD_OUT))
         return np.asarray(position % every == every - 1)
@@ -125,10 +128,7 @@ def _dataset(ordered: Sequence[tuple[Settings, Reader]]) -> Dataset:
 def open_dataset(paths: Sequence[str | Path]) -> Dataset:
     """The shards at `paths`, each checked whole, as one dataset.
 
-    Raises
-    ------
-    UserError
-        If there is none, one is missing or damaged, or they do not belong together.
+    Raises UserError if there is none, one is missing or damaged, or they do not belong together.
     """
     all_settings = [read_settings(path) for path in paths]
     return _dataset(
@@ -143,10 +143,7 @@ def _reader_of(path: str | Path) -> Reader:
 def dataset_of(shards: Sequence[Shard]) -> Dataset:
     """Shards in memory as one dataset.
 
-    Raises
-    ------
-    UserError
-        If there is none or they do not belong together.
+    Raises UserError if there is none or they do not belong together.
     """
     names = [f"shard {number}" for number in range(len(shards))]
     ordered = in_order(names, [shard.settings for shard in shards])
@@ -157,3 +154,39 @@ def dataset_of(shards: Sequence[Shard]) -> Dataset:
 def _slices(shard: Shard, first: int, past: int) -> Iterator[Shard]:
     for begin in range(first, past, PIECE_ROWS):
         yield shard.part(begin, min(begin + PIECE_ROWS, past))
+
+
+def is_uniform(young: Array) -> Flags:
+    """Whether all filled cells of each block (n, 8) are equal; shape (n,)."""
+    return np.asarray(young.max(axis=1) == np.where(young > 0, young, np.inf).min(axis=1))
+
+
+def modulus_over_scale(target: Array, transform: str) -> Array:
+    """Ratios E / scale from what the trees learn."""
+    return target if transform == "ratio" else np.exp(target)
+
+
+def _transformed(features: Features, transform: str) -> Features:
+    if transform != "bounded":
+        return features
+    ratio = features.astype(float)
+    return np.asarray(((ratio - 1.0) / (ratio + 1.0)).astype(np.float32))
+
+
+def rows_of(samples: Samples, transform: str, uniform_weight: float = 1.0) -> tuple[Rows, Rows]:
+    """Rows with a void and with a filled origin."""
+    prepared = prepare(samples.young, transform if transform in TRANSFORMS else "ratio")
+    ratios = samples.moduli / prepared.scale
+    target = ratios if transform == "ratio" else np.log(ratios)
+    weight = np.where(is_uniform(samples.young), uniform_weight, 1.0)
+    weight = np.broadcast_to(weight[:, None], target.shape)
+    void, filled = (
+        Rows(
+            _transformed(prepared.features[kind], transform),
+            prepared.pattern[kind],
+            target[kind],
+            weight[kind],
+        )
+        for kind in (~prepared.filled, prepared.filled)
+    )
+    return void, filled

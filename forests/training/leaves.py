@@ -6,20 +6,22 @@ grow with it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.element import Array
-from forests.scaling import FEATURES, Features
+from carillon.arrays import Array, Index
+from forests.layout import pack
+from forests.model import Forests
+from forests.scaling import FEATURES, PATTERNS, Features
 from forests.training.moments import ENTRIES, WEIGHT, solve
 from forests.training.structure import Rows, Tree
 
 THIN = 10
 """Rows below which a leaf takes the bounds of its answers from an ancestor."""
-
 ANCESTOR_ROWS = 64
 """Rows of the ancestor that a leaf leans on, at least."""
 
@@ -56,7 +58,7 @@ class Sums:
     """
 
     moments: Array
-    rows: NDArray[np.int64]
+    rows: Index
     low: Array
     high: Array
 
@@ -116,7 +118,7 @@ def _accumulate(
     weight: Array,
     leaf_numbers: NDArray[np.int32],
     moments: Array,
-    rows: NDArray[np.int64],
+    rows: Index,
     low: Array,
     high: Array,
 ) -> None:
@@ -155,13 +157,7 @@ def add_rows(sums: Sums, tree: Tree, rows: Rows) -> None:
 
 
 @numba.njit(cache=True)
-def _gather(
-    parent: NDArray[np.int64],
-    moments: Array,
-    rows: NDArray[np.int64],
-    low: Array,
-    high: Array,
-) -> None:
+def _gather(parent: Index, moments: Array, rows: Index, low: Array, high: Array) -> None:
     """Add every node to its parent; parents come before their children."""
     for node in range(len(parent) - 1, -1, -1):
         above = parent[node]
@@ -172,7 +168,7 @@ def _gather(
             high[above] = max(high[above], high[node])
 
 
-def _over_nodes(tree: Tree, sums: Sums) -> tuple[Sums, NDArray[np.int64]]:
+def _over_nodes(tree: Tree, sums: Sums) -> tuple[Sums, Index]:
     """Sums over the rows below each node, and the parent (nodes,) of each, -1 for roots."""
     nodes = Sums.nothing(len(tree.left))
     last, inner = tree.left < 0, np.flatnonzero(tree.left >= 0)
@@ -222,3 +218,31 @@ def answers_of(tree: Tree, leaves: Leaves, rows: Rows) -> Array:
     coefficients = leaves.coefficients[leaf_numbers]
     linear = (rows.features * coefficients[:, :FEATURES]).sum(axis=1) + coefficients[:, FEATURES]
     return np.asarray(np.clip(linear, leaves.low[leaf_numbers], leaves.high[leaf_numbers]))
+
+
+def join(void: Sequence[tuple[Tree, Leaves]], filled: Sequence[tuple[Tree, Leaves]]) -> Forests:
+    """Put the trees of both forests, equally many, into one set of arrays.
+
+    Raises UserError, see `forests.layout.pack`.
+    """
+    trees = [tree for tree, _ in (*void, *filled)]
+    leaves = [part for _, part in (*void, *filled)]
+    nodes = np.cumsum([0] + [len(tree.left) for tree in trees])
+    count = np.cumsum([0] + [tree.leaves for tree in trees])
+
+    def shifted(name: str, offsets: Index) -> NDArray[np.int32]:
+        parts = [getattr(tree, name) for tree in trees]
+        moved = [np.where(part < 0, -1, part + o) for part, o in zip(parts, offsets)]
+        return np.concatenate(moved).astype(np.int32)
+
+    records = [np.column_stack([part.coefficients, part.low, part.high]) for part in leaves]
+    roots, packed, ordered = pack(
+        np.concatenate([tree.feature for tree in trees]),
+        np.concatenate([tree.threshold for tree in trees]),
+        shifted("left", nodes),
+        shifted("right", nodes),
+        shifted("leaf", count),
+        shifted("roots", nodes).reshape(2, len(void), PATTERNS),
+        np.concatenate(records).astype(np.float32),
+    )
+    return Forests(roots, packed, ordered)

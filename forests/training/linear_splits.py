@@ -14,13 +14,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array, Index
 from forests.scaling import FEATURES, Features
 from forests.training.moments import ENTRIES, fit_errors, products
 
 BINS = 16
 """Candidate thresholds of a feature, plus one: quantiles of rows drawn from the node."""
-
 QUANTILE_ROWS = 512
 
 SPLIT_ROWS = 3000
@@ -29,11 +28,7 @@ SPLIT_ROWS = 3000
 
 @numba.njit(cache=True, nogil=True)
 def _thresholds(
-    features: Features,
-    rows: NDArray[np.int64],
-    generator: np.random.Generator,
-    edges: Array,
-    values: Array,
+    features: Features, rows: Index, generator: np.random.Generator, edges: Array, values: Array
 ) -> None:
     """Quantiles (7, BINS - 1) of rows drawn at random; infinite where there are no more."""
     drawn = min(len(rows), QUANTILE_ROWS)
@@ -52,9 +47,7 @@ def _thresholds(
 
 
 @numba.njit(cache=True, nogil=True)
-def _mean_row(
-    features: Features, target: Array, rows: NDArray[np.int64], used: int, centre: Array
-) -> None:
+def _mean_row(features: Features, target: Array, rows: Index, used: int, centre: Array) -> None:
     centre[:] = 0.0
     step = len(rows) / used
     for q in range(used):
@@ -70,7 +63,7 @@ def _best_split(
     features: Features,
     target: Array,
     weight: Array,
-    rows: NDArray[np.int64],
+    rows: Index,
     min_leaf: int,
     generator: np.random.Generator,
 ) -> tuple[int, float, float]:
@@ -122,7 +115,7 @@ def _best_split(
 
 
 @numba.njit(cache=True, nogil=True)
-def _divide(column: NDArray[np.float32], threshold: float, rows: NDArray[np.int64]) -> int:
+def _divide(column: NDArray[np.float32], threshold: float, rows: Index) -> int:
     """Bring the rows that go left to the front; how many they are."""
     first, last = 0, len(rows) - 1
     while first <= last:
@@ -139,8 +132,8 @@ def grow_linear(
     features: Features,
     target: Array,
     weight: Array,
-    rows: NDArray[np.int64],
-    starts: NDArray[np.int64],
+    rows: Index,
+    starts: Index,
     max_leaves: int,
     min_leaf: int,
     depth: int,

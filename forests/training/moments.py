@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from forests.scaling import FEATURES
 
 ONE, TARGET = FEATURES, FEATURES + 1
@@ -17,10 +17,8 @@ ENTRIES = (FEATURES + 2) * (FEATURES + 3) // 2
 
 WEIGHT = ONE * (ONE + 1) // 2 + ONE
 """Entry that holds the sum of the weights."""
-
 RELATIVE_RIDGE = 1e-7
 """Ridge in units of a feature's own spread: enough where features are proportional."""
-
 ROUNDING = 1e-10
 """Squared spread of a feature relative to its squared mean below which it counts as constant."""
 

@@ -66,10 +66,7 @@ class Ranks:
     def agree(self, action: Callable[[], T]) -> T:
         """The result of `action`, which refuses its input on every rank if it does on any of them.
 
-        Raises
-        ------
-        UserError
-            On every rank, what the first of those that refused it said.
+        Raises UserError on every rank, what the first of those that refused it said.
         """
         if self._comm is None:
             return action()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from carillon.arrays import Array
 from carillon.fem.block import ALL_FILLED
-from carillon.fem.element import Array
 from dataset_gen.objectives import fit
 from dataset_gen.sampling import pattern_classes
 from forests.evaluate import coarsen

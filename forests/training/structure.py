@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.element import Array
+from carillon.arrays import Array
 from forests.scaling import FEATURES, PATTERNS, Features
 from forests.training.linear_splits import grow_linear
 
@@ -91,11 +91,7 @@ def tree_of(
 def flatten(tree: Any) -> Tree:
     """Arrays of a fitted scikit-learn tree (its `tree_`), one root for all void patterns."""
     return tree_of(
-        tree.feature,
-        tree.threshold,
-        tree.children_left,
-        tree.children_right,
-        np.zeros(PATTERNS),
+        tree.feature, tree.threshold, tree.children_left, tree.children_right, np.zeros(PATTERNS)
     )
 
 

@@ -20,11 +20,9 @@ from carillon.records import provenance
 from forests.layout import MOST_LEAVES
 from forests.model import FILLED, VOID, Model
 from forests.scaling import TRANSFORMS
-from forests.training.dataset import Dataset, Samples, joined
-from forests.training.join import join
-from forests.training.leaves import Leaves, Sums, add_rows, solve_leaves
+from forests.training.dataset import Dataset, Samples, joined, rows_of
+from forests.training.leaves import Leaves, Sums, add_rows, join, solve_leaves
 from forests.training.ranks import Ranks
-from forests.training.rows import rows_of
 from forests.training.scores import held_out_scores, uniform_scores
 from forests.training.structure import GROWERS, Rows, Tree, TreeLimits
 
@@ -47,12 +45,10 @@ class TrainingOptions:
     min_leaf: Count = option(30, "rows of the subset that a leaf needs")
     structure_rows: Count = option(5_000_000, "rows of the subset that splits are chosen from")
     prior: Annotated[float, between(1e-9, 1e9)] = option(
-        0.5,
-        "rows that the surroundings of a leaf count for in it",
+        0.5, "rows that the surroundings of a leaf count for in it"
     )
     uniform_weight: Annotated[float, between(1e-9, 1e9)] = option(
-        400.0,
-        "weight of blocks of one material; they are few but fill most real objects",
+        400.0, "weight of blocks of one material; they are few but fill most real objects"
     )
     transform: Annotated[str, OneOf(*TRANSFORMS)] = option("log", "of the features and the target")
     grower: Annotated[str, OneOf(*GROWERS)] = option("linear", "how splits are chosen")
@@ -82,12 +78,8 @@ def grow_trees(
 ) -> dict[int, Tree]:
     """First step: the splits of some of the trees, one tree a thread.
 
-    A tree depends on the dataset, the parameters and its number alone.
-
-    Raises
-    ------
-    UserError
-        If there are too few rows with a void or with a filled origin.
+    A tree depends on the dataset, the parameters and its number alone. Raises UserError if there
+    are too few rows with a void or with a filled origin.
     """
     if not jobs:
         return {}
@@ -184,7 +176,6 @@ def fit_leaves(
 
 
 def _ahead(pool: ThreadPoolExecutor, items: Iterator[T]) -> Iterator[T]:
-    """The items, the next one being made while one is used."""
     following = pool.submit(next, items, None)
     while (item := following.result()) is not None:
         following = pool.submit(next, items, None)
@@ -220,18 +211,9 @@ def train_trees(
 ) -> Trained | None:
     """Both steps on several ranks, each with its share of the trees and of the samples.
 
-    Parameters
-    ----------
-    workers
-        Threads of every rank.
-    grown
-        Splits by tree number from `grow_trees` and the seconds they took, if they are there.
-
-    Returns
-    -------
-    Trained or None
-        The trees on the first rank, None on the others. They depend on the number of ranks to
-        rounding.
+    `grown` are the splits by tree number from `grow_trees` and the seconds they took, if they are
+    there. Returns the trees on the first rank, None on the others. They depend on the number of
+    ranks to rounding.
     """
     begin = time.perf_counter()
     if grown is None:

@@ -42,10 +42,8 @@ def load_trees(
 ) -> tuple[dict[int, Tree], float]:
     """Trees by number, and the seconds that growing them took in all.
 
-    Raises
-    ------
-    UserError
-        If a file is missing, damaged or of another training, or the trees are not each there once.
+    Raises UserError if a file is missing, damaged or of another training, or the trees are not each
+    there once.
     """
     expected = json.dumps(parameters, sort_keys=True)
     trees: dict[int, Tree] = {}

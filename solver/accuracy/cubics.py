@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import NODES, degrees_of_freedom
 from carillon.fem.element import KEPT, elasticity_matrix, strain_displacement
 from carillon.fem.finite_cells.model import FiniteCellModel
@@ -27,9 +27,6 @@ from carillon.fem.finite_cells.shapes import (
     shape_functions,
     strain_factors,
 )
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 EDGES: Index = np.flatnonzero((NODES == 1).sum(axis=1) == 1)
 """Numbers (12,) of the nodes in the middles of a cell's edges."""
@@ -163,10 +160,7 @@ def _along(places: Array, low: bool) -> tuple[Array, Array]:
     cubic = (0.1 if low else places * (1.0 - places)) * (2.0 * places - 1.0)
     slope = -6.0 * places**2 + 6.0 * places - 1.0
     ones = np.ones_like(places)
-    return (
-        np.stack([1.0 - places, cubic, places], axis=1),
-        np.stack([-ones, slope, ones], axis=1),
-    )
+    return (np.stack([1.0 - places, cubic, places], axis=1), np.stack([-ones, slope, ones], axis=1))
 
 
 @cache

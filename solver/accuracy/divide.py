@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from mpi4py import MPI
 
+from carillon.arrays import Array, Index
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
-from solver.refinement.refine import DIVIDED_CELLS, RefinementStep
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from solver.analysis.modes import Modes
+from solver.distribution.collective import bcast_from_root, compute_on_root, optional
+from solver.refinement.errors import DIVIDED_CELLS, RefinementStep
+from solver.refinement.estimate import MODES_USED
 
 REMAINING = 0.7
 """Share of the allowed error at which the division of cells aims."""
@@ -26,15 +29,7 @@ MOST_STEPS = 3
 
 
 class DividedCells:
-    """A solid of finite cells and which of them are divided.
-
-    Parameters
-    ----------
-    covering
-        The undivided cells.
-    model
-        Their material.
-    """
+    """A solid of finite cells and which of them are divided."""
 
     def __init__(self, covering: Covering, model: FiniteCellModel) -> None:
         self.model, self._undivided, self._covering = model, model, covering
@@ -42,7 +37,11 @@ class DividedCells:
         self._steps = 0
 
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
-        """See `Refinable.advance`; cells are divided unless too many of them would have to be."""
+        """Rate the cells by eigenvalues (k,) and modes (n_dofs, k), and divide some of them.
+
+        Also returns whether the cells stay as they are: their errors are within `tolerance`, or too
+        many of them would have to be divided.
+        """
         estimate = estimate_cell_errors(self.model, values, modes)
         step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, len(self._places), estimate.errors)
         above = estimate.errors.excess(tolerance)
@@ -80,3 +79,50 @@ class DividedCells:
         self.model = replace(self._undivided, cells=division.cells, young=young)
         self._steps += 1
         return True
+
+
+def solve_refined(
+    solve: Callable[[FiniteCellModel | None], Modes],
+    cells: DividedCells | None,
+    tolerance: float,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    report: Callable[[RefinementStep], None] | None = None,
+) -> tuple[FiniteCellModel | None, Modes, list[RefinementStep]]:
+    """Solve, estimate and divide until the expected error is at most `tolerance`; collective.
+
+    An estimate that fails, or a model that cannot be solved, ends it with a warning: the last modes
+    stand. The tolerance is that of the root mean square of the relative errors of frequencies 7 to
+    60; the worst may be three times as large. Returns the last model that was solved, on rank 0;
+    its modes, and the steps that were rated.
+    """
+    steps: list[RefinementStep] = []
+    model = compute_on_root(comm, lambda: None if cells is None else cells.model)
+    modes = solve(model)
+    while True:
+        gathered = modes.system.gather(np.ascontiguousarray(modes.vectors[:, :MODES_USED]))
+        rated = optional(
+            comm,
+            "how far frequencies are off cannot be told",
+            partial(bcast_from_root, comm, partial(_advance, cells, modes, gathered, tolerance)),
+        )
+        if rated is None:
+            return model, modes, steps
+        step, done = rated
+        steps.append(step)
+        if report is not None and comm.rank == 0:
+            report(step)
+        if done:
+            return model, modes, steps
+        finer = compute_on_root(comm, lambda: None if cells is None else cells.model)
+        better = optional(comm, "the model is refined no further", partial(solve, finer))
+        if better is None:
+            return model, modes, steps
+        modes.destroy()
+        model, modes = finer, better
+
+
+def _advance(
+    cells: DividedCells | None, modes: Modes, gathered: Array | None, tolerance: float
+) -> tuple[RefinementStep, bool]:
+    assert cells is not None and gathered is not None
+    return cells.advance(modes.values[:MODES_USED], gathered, tolerance)

@@ -12,15 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import RIGID_MODES
 from solver.accuracy.cubics import CubicSurplus, cubic_surplus
 from solver.accuracy.surplus import losses
 from solver.refinement.errors import LAST, ExpectedErrors
-
-Array = NDArray[np.float64]
 
 SLOWEST, FASTEST = 2.0, 16.0
 """Bounds of the factor by which halved cells diminish an error: that of cracks, and of smooth
@@ -51,11 +49,8 @@ class CellErrors:
 def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) -> CellErrors:
     """Expected errors of the frequencies of finite cells against the solid's, up to mode `LAST`.
 
-    Parameters
-    ----------
-    values, modes
-        (k,) eigenvalues [rad^2/s^2] and (n_dofs, k) mass-normalised modes, the six rigid ones
-        included.
+    `values` (k,) are eigenvalues [rad^2/s^2] and `modes` (n_dofs, k) mass-normalised, the six rigid
+    ones included.
 
     Examples
     --------

@@ -7,13 +7,11 @@ from itertools import product
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
+from carillon.arrays import Array, Flags
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.grid import Grid
-
-Array = NDArray[np.float64]
 
 INTERPOLATED = ("uniform", "smooth")
 """Materials that vary gradually. In the others each voxel has a modulus of its own."""
@@ -40,7 +38,7 @@ class PlacedMaterial:
 
     lattice: Grid
     young: Array
-    filled: NDArray[np.bool_]
+    filled: Flags
     interpolated: bool
 
     @classmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +13,9 @@ from mpi4py import MPI
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.materials import NAMES
 from carillon.fem.model import ElasticModel, Solid, fine_model
-from solver.accuracy.divide import DividedCells
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import between
+from solver.accuracy.divide import DividedCells, solve_refined
 from solver.accuracy.voxels import Reference
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
@@ -22,15 +24,17 @@ from solver.analysis.solid_surface import SolidSurface
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.files.modes_file import FINE_TAKEN, read_modes
 from solver.refinement.coarse_or_fine import solve_coarsened
-from solver.refinement.errors import FROM_FINE, FROM_SOLID, LAST, WORST, ExpectedErrors
-from solver.refinement.model_solver import SolveModel
-from solver.refinement.refine import (
+from solver.refinement.errors import (
     DIVIDED_CELLS,
     FINE_BLOCKS,
-    Refinable,
+    FROM_FINE,
+    FROM_SOLID,
+    LAST,
+    WORST,
+    ExpectedErrors,
     RefinementStep,
-    solve_refined,
 )
+from solver.refinement.model_solver import SolveModel
 from solver.refinement.refined_model import RefinedModel
 
 MOST_UNKNOWNS = 400_000
@@ -39,6 +43,8 @@ UNTOLD = "how far frequencies are from the solid's cannot be told"
 """Warning where the estimate fails."""
 LEAST_STEP, LARGEST_STEP = 1.2, 2.0
 """Least and largest factor by which a resolution is raised."""
+FIRST_RESOLUTION = 16
+"""First resolution of a search for an accurate one."""
 
 
 @dataclass
@@ -51,8 +57,6 @@ class Solved:
         The solid, at the resolution that was solved.
     problem, model
         The discretised solid, and the model of it that was solved; on rank 0, None on the others.
-    modes
-        Modes of the model.
     achieved
         Plain values: what is expected of the frequencies' errors; `fine_taken` is why the fine
         solid was taken for a coarse one, if that is so.
@@ -76,8 +80,6 @@ class AccuracyRequest:
         to leave it.
     refine_to
         Expected error down to which a coarse mesh or finite cells are refined; None to leave them.
-    estimated
-        Whether the distance from the solid is estimated.
     start
         Modes file whose refined mesh is begun from.
     """
@@ -98,19 +100,8 @@ def solve_solid(
 ) -> Solved:
     """Modes of a solid, as accurate as requested, and their expected errors; collective.
 
-    Parameters
-    ----------
-    solid
-        The solid, with the resolution to begin with.
-    solve, options
-        What finds the modes of a model, and how it does, which coarse models are weighed by.
-    report
-        Called on rank 0 with each step of a refinement.
-
-    Raises
-    ------
-    UserError
-        For anything wrong with the solid, and if it would be too large to be so accurate.
+    `solve` finds the modes of a model by the `options`, which coarse models are weighed by. Raises
+    UserError for anything wrong with the solid, and if it would be too large to be so accurate.
     """
     search = _Search(solve, options, request, comm, report)
     solved = search.solved(solid)
@@ -123,8 +114,6 @@ def solve_solid(
 
 @dataclass(frozen=True)
 class _Search:
-    """What stays the same at all resolutions, see `solve_solid`."""
-
     solve: SolveModel
     options: SolverOptions
     request: AccuracyRequest
@@ -179,8 +168,7 @@ class _Search:
         return int(np.ceil(factor * solid.resolution))
 
     def _divided(self, solid: ProblemOptions, problem: Problem | None, tolerance: float) -> Solved:
-        """Finite cells that are divided where it matters."""
-        start: Refinable[Any] | None = compute_on_root(self.comm, lambda: _undivided(problem))
+        start: DividedCells | None = compute_on_root(self.comm, lambda: _undivided(problem))
         model, modes, steps = solve_refined(self.solve, start, tolerance, self.comm, self.report)
         achieved: dict[str, Any] = {}
         if steps:
@@ -209,7 +197,6 @@ class _Search:
         return Solved(solid, problem, result.model, result.modes, achieved)
 
     def _distance_of_voxels(self, solved: Solved) -> dict[str, Any]:
-        """Distance of voxels from the solid, as attributes."""
         cells = compute_on_root(self.comm, lambda: _reference(solved))
         reference = self.solve(None if cells is None else cells.model, LAST)
         modes = reference.system.gather(reference.vectors)
@@ -252,3 +239,34 @@ def _fine(problem: Problem) -> ElasticModel:
         density=coarse.density,
         lumped=coarse.lumped,
     )
+
+
+@parameters
+class DistanceOptions:
+    """Which distance from the solid's frequencies is asked for, and whether it is estimated."""
+
+    accuracy: Annotated[float, between(1e-05, 1.0)] | None = option(
+        None,
+        "raise the resolution until frequencies are expected to be so near to the solid's: the "
+        "root mean square of the relative errors, and a third of the worst "
+        f"(from --resolution, or {FIRST_RESOLUTION})",
+        metavar="ERROR",
+    )
+    estimate: bool | None = option(
+        None,
+        "estimate how far frequencies are from the solid's; voxels are compared with finite cells "
+        "(default: unless a mesh is coarsened, or for slepc and arpack)",
+    )
+
+    def is_estimated(self, solid: ProblemOptions, solver: SolverOptions) -> bool:
+        """Whether the distance from the solid is estimated.
+
+        Raises UserError if it is not to be, and an accuracy is asked for.
+        """
+        if self.accuracy is not None:
+            if self.estimate is False:
+                raise UserError("--accuracy goes by the estimate: leave out --no-estimate")
+            return True
+        if self.estimate is not None:
+            return self.estimate
+        return solid.coarsen == "none" and not solver.is_general

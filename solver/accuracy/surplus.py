@@ -8,18 +8,15 @@ nearest in energy, tells how fast the modes converge at that place.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.finite_cells.shapes import shape_functions
 from carillon.fem.geometry.faces import face_neighbours
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 CHUNK = 256
 """Approximate number of cells whose matrices are held at once."""
@@ -28,18 +25,12 @@ SHIFT = 1e-11
 
 
 def energy_lost(
-    model: FiniteCellModel,
-    modes: Array,
-    groups: Index,
-    corners: Index,
-    edge: int,
+    model: FiniteCellModel, modes: Array, groups: Index, corners: Index, edge: int
 ) -> Array:
     """Energy (c, k) in each cell of what one larger cell about its group cannot represent.
 
     Parameters
     ----------
-    model
-        Cells and their material.
     modes
         (n_dofs, k) displacements.
     groups : (c,)
@@ -110,10 +101,8 @@ def larger_cells(cells: FiniteCells, pairs: Index, edge: int) -> tuple[Index, In
 def losses(model: FiniteCellModel, modes: Array) -> tuple[Array, Array, Index]:
     """Energies (c, k) in each cell that cells of two and of four times its edge cannot represent.
 
-    Returns
-    -------
-    tuple[Array, Array, Index]
-        The energies, and the group (c,) of cells of one size in one place of four times their edge.
+    Returns the energies, and the group (c,) of cells of one size in one place of four times their
+    edge.
     """
     cells = model.cells
     pairs, span = face_neighbours(model.hexmesh), cells.span

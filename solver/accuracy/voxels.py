@@ -6,28 +6,25 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Surface
+from carillon.fem.finite_cells.build import covering
+from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.model import RIGID_MODES
 from solver.accuracy.estimate import estimate_cell_errors
-from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.material import INTERPOLATED, PlacedMaterial
 from solver.analysis.problem import Problem, ProblemOptions
 from solver.refinement.errors import ExpectedErrors
 
-Array = NDArray[np.float64]
+WHOLE = 4
+"""Number of voxels along the edge of a finite cell at half the resolution."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Finite cells of the solid that voxels stand for, with the voxels' material.
-
-    Attributes
-    ----------
-    model
-        Model of finite cells on the voxels' lattice.
-    """
+    """Finite cells of the solid that voxels stand for, with the voxels' material."""
 
     model: FiniteCellModel
 
@@ -35,10 +32,7 @@ class Reference:
     def of_voxels(cls, options: ProblemOptions, problem: Problem) -> Self:
         """Finite cells on the lattice of a problem's voxels, which `options` describe.
 
-        Raises
-        ------
-        UserError
-            If the solid is lost between the lines of the lattice.
+        Raises UserError if the solid is lost between the lines of the lattice.
         """
         surface = problem.surface
         lattice = voxel_lattice(surface.triangles, options.resolution)
@@ -63,3 +57,19 @@ class Reference:
         chosen = slice(RIGID_MODES, RIGID_MODES + count)
         ratio = np.sqrt(np.maximum(voxels[chosen], 0.0) / values[chosen])
         return ExpectedErrors(ratio * (1.0 + own[:count]) - 1.0)
+
+
+def voxel_lattice(surface: Surface, resolution: int) -> Grid:
+    """Lattice of the voxels of a surface, with empty ones up to whole cells of half the resolution.
+
+    They follow at the far ends, so that the voxels of the surface are on it.
+    """
+    grid = bounding_grid(surface, resolution)
+    nx, ny, nz = (-(-size // WHOLE) * WHOLE for size in grid.shape)
+    return Grid(grid.origin, grid.edge, (nx, ny, nz))
+
+
+def covering_on(surface: Surface, lattice: Grid, components: str, name: str) -> Covering:
+    """Finite cells on a lattice, see `carillon.fem.finite_cells.build.finite_cells`."""
+    longest = float(np.ptp(surface.bounds, axis=0).max())
+    return covering(surface, round(longest / lattice.edge), components, name, lattice)

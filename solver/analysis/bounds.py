@@ -14,8 +14,6 @@ from solver.correction.criteria import FEWEST_GUARDS, default_guard
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
 from solver.reference.truth import SPARE_MODES
 
-FEWEST_SPARE = SPARE_MODES
-"""Number of vectors beyond the requested modes that tell the last of these from the rest."""
 KEPT_FRACTION, TOGETHER_FRACTION = 1.6, 1.17
 """Modes kept at the root of the merge tree as a multiple of those requested: in general, and where
 a block Lanczos iteration corrects them together."""
@@ -68,5 +66,5 @@ def default_keep(modes: int, parts: int, together: bool = False) -> int:
     """
     grown = max(1.0, parts / FEW_PARTS) ** (1.0 / 3.0)
     if together:
-        return max(int(TOGETHER_FRACTION * grown * modes), modes + FEWEST_GUARDS + FEWEST_SPARE)
-    return max(int(KEPT_FRACTION * grown * modes), modes + default_guard(modes) + FEWEST_SPARE)
+        return max(int(TOGETHER_FRACTION * grown * modes), modes + FEWEST_GUARDS + SPARE_MODES)
+    return max(int(KEPT_FRACTION * grown * modes), modes + default_guard(modes) + SPARE_MODES)

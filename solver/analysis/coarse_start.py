@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import Blocks, blocks_from_mesh, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
@@ -20,8 +20,6 @@ from solver.correction.random_start import Approximation
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import COLUMNS, scatter_rows
 
-Array = NDArray[np.float64]
-
 TOLERANCE = 1e-3
 """Relative eigenvalue error of the coarse modes: less than what coarsening adds."""
 
@@ -31,18 +29,8 @@ def coarse_start(
 ) -> Approximation:
     """Modes of the 2x2x2 blocks of a fine model, prolonged to its nodes; collective.
 
-    Parameters
-    ----------
-    solver
-        Prepared for the fine model.
-    model, coarsening
-        The fine model, of voxels with one modulus each, and what makes coarse elements of its
-        blocks; on rank 0.
-
-    Raises
-    ------
-    UserError
-        For a model that is not coarsened, or too few coarse unknowns.
+    Rank 0 has the fine `model`, of voxels with one modulus each, and what makes coarse elements of
+    its blocks. Raises UserError for a model that is not coarsened, or too few coarse unknowns.
     """
     comm = solver.comm
     coarsened = compute_on_root(comm, lambda: _coarsened(model, coarsening))

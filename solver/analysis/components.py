@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import RIGID_MODES
-from solver.analysis.bounds import FEWEST_SPARE, default_keep
+from solver.analysis.bounds import default_keep
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import System
 from solver.distribution.local_mesh import LocalMesh
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
-
-Array = NDArray[np.float64]
+from solver.reference.truth import SPARE_MODES
 
 ORTHOGONAL_TO_RIGID = 1e-10
 """Largest overlap of HCMS modes with the rigid motions that is not removed."""
@@ -25,15 +24,8 @@ ORTHOGONAL_TO_RIGID = 1e-10
 class ComponentModes:
     """Hierarchical component mode synthesis on one mesh.
 
-    Parameters
-    ----------
-    together
-        Whether a block Lanczos iteration corrects the modes, which needs fewer of them.
-
-    Raises
-    ------
-    UserError
-        If `--retained-modes` is too few for the modes that are asked for.
+    Fewer modes are needed if a block Lanczos iteration corrects them `together`. Raises UserError
+    if `--retained-modes` is too few for the modes that are asked for.
     """
 
     def __init__(
@@ -66,7 +58,7 @@ def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool
     if keep is None:
         parts = local_mesh.decomposition.tree.parts
         keep = default_keep(options.modes, parts, together and options.is_corrected)
-    least = options.modes + (FEWEST_SPARE if options.corrections else 0)
+    least = options.modes + (SPARE_MODES if options.corrections else 0)
     if keep < min(least, local_mesh.n_dofs):
         raise UserError(
             f"--retained-modes {keep} is too few for {options.modes} modes; "
@@ -79,10 +71,7 @@ def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool
 def lowest_pairs(synthesis: Synthesis, count: int) -> tuple[Array, Array]:
     """The `count` lowest values and vectors, uncorrected.
 
-    Raises
-    ------
-    UserError
-        If the synthesis kept fewer.
+    Raises UserError if the synthesis kept fewer.
     """
     if len(synthesis.values) < count:
         raise UserError(

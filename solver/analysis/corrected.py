@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions
-from solver.analysis.proof import completed
-from solver.analysis.timing import Phases
+from solver.analysis.proof import Phases, completed
 from solver.assembly.system import System
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, accurate_count, carried_count
 from solver.correction.error_correction import correct
@@ -25,8 +24,6 @@ from solver.linear import Lasting, LinearSolver
 from solver.reference.truth import SPARE_MODES, Truth, can_count
 from solver.subspace.rayleigh_ritz import rigid_pairs
 from solver.subspace.weyl import CountingLaw
-
-Array = NDArray[np.float64]
 
 FEWEST_CORRECTED = 6
 """Least number of modes that are corrected after HCMS. The first mode of a ball alone, one of five
@@ -45,8 +42,6 @@ class Eigenpairs:
 
 @dataclass
 class _Start:
-    """What a correction begins with, see `solver.correction.error_correction.correct`."""
-
     values: Array | None
     vectors: Array | None
     similar: Lasting | None = None
@@ -56,18 +51,7 @@ class _Start:
 class CorrectedModes:
     """Corrected modes of one mesh, for any material on it.
 
-    Parameters
-    ----------
-    options
-        What to compute and how, the method being one of those that correct.
-    local_mesh
-        This rank's part of the mesh.
-    linear
-        Solver of linear systems with its matrices.
-    threads
-        Threads of this rank.
-    report
-        Called on each rank with the step and the largest estimated error.
+    `report` is called on each rank with the step and the largest estimated error.
     """
 
     def __init__(
@@ -89,7 +73,6 @@ class CorrectedModes:
 
     @property
     def _together(self) -> bool:
-        """Whether a block Lanczos iteration corrects all modes together."""
         return self._options.acceleration == "lanczos" and self._linear.indefinite
 
     def solve(
@@ -104,16 +87,7 @@ class CorrectedModes:
     ) -> Eigenpairs:
         """Modes of a material; collective.
 
-        Parameters
-        ----------
-        local_mesh, system
-            This rank's part of the solid with its material, and its matrices.
-        initial, same_mesh
-            What to start from, and whether these are modes that were found on this mesh.
-        law
-            Tells where the eigenvalues are expected.
-        phases, evidence
-            Get the seconds, and what was achieved.
+        They start from `initial`, which may be modes that were found on this `same_mesh`.
         """
         options, tolerance = self._options, self._options.tolerance
         tolerance = EIGENVALUE_TOLERANCE if tolerance is None else tolerance

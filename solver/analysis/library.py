@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.materials import young_modulus
@@ -18,8 +17,6 @@ from solver.analysis.options import SolverOptions
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import scatter_rows
 from solver.files.modes_file import frequencies
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -59,6 +56,9 @@ def solve(
 ) -> Solution:
     """Lowest modes of a solid.
 
+    Raises UserError for a material that does not fit the mesh, or impossible options, and
+    ConvergenceError if a tolerance was missed.
+
     Parameters
     ----------
     model
@@ -75,13 +75,6 @@ def solve(
         Ranks that share the work.
     options
         Other fields of `SolverOptions`: `method`, `tolerance`, `linear_solver` and so on.
-
-    Raises
-    ------
-    UserError
-        For a material that does not fit the mesh, or impossible options.
-    ConvergenceError
-        If a tolerance was missed.
 
     Notes
     -----

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeGuard, cast
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.fem.model import Solid
 from carillon.fem.moduli import require_coarse_moduli
@@ -21,20 +20,20 @@ from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.corrected import CorrectedModes, Eigenpairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import RANDOM, SolverOptions
-from solver.analysis.prepared import Prepared
-from solver.analysis.proof import ground_truth, prove
-from solver.analysis.timing import Phases
-from solver.assembly.system import assemble
+from solver.analysis.proof import Phases, ground_truth, prove
+from solver.assembly.system import Layout, System, assemble
 from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
-from solver.distribution.local_mesh import distribute, scatter_moduli, with_poisson
-from solver.linear import Inverse
+from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
+from solver.linear import Inverse, LinearSolver
 from solver.subspace.weyl import CountingLaw
-
-Array = NDArray[np.float64]
 
 
 class ModalSolver:
     """Modes of one mesh for any material on it.
+
+    Its `seconds` are the wall time of what depends on the mesh alone, by phase. Raises UserError if
+    more modes are wanted than there are unknowns or than memory can hold, or there are more ranks
+    than subdomains.
 
     Parameters
     ----------
@@ -42,25 +41,8 @@ class ModalSolver:
         The solid; only rank 0's is looked at, and scattered to the others, who may pass None.
     options
         What to compute and how.
-    comm
-        Ranks that share the work.
-    verbose
-        Whether to show each phase and its time.
     prepared
         Partition and analysis of the same mesh, of use to methods that begin with random vectors.
-
-    Attributes
-    ----------
-    local_mesh
-        This rank's part of the solid.
-    seconds
-        Wall time of what depends on the mesh alone, by phase.
-
-    Raises
-    ------
-    UserError
-        If more modes are wanted than there are unknowns or than memory can hold, or there are more
-        ranks than subdomains.
 
     Examples
     --------
@@ -114,10 +96,13 @@ class ModalSolver:
         young: Array | None = None,
         initial_modes: Initial | None = None,
         poisson: float | None = None,
+        coarsened: bool = False,
     ) -> Modes:
         """Compute the lowest modes.
 
-        All ranks call it and get the same values.
+        All ranks call it and get the same values. Raises UserError for what `Solid.element_moduli`
+        or `require_coarse_moduli` refuses, and ConvergenceError if a tolerance was missed, the
+        modes are not orthonormal, or the body does not have six zero-frequency modes.
 
         Parameters
         ----------
@@ -129,56 +114,16 @@ class ModalSolver:
             or those of a coarser mesh, see `solver.analysis.coarse_start`: they are corrected.
         poisson
             Poisson's ratio, the same on every rank; that of the model if not given.
-
-        Raises
-        ------
-        UserError
-            For what `Solid.element_moduli` refuses.
-        ConvergenceError
-            If a tolerance was missed, the modes are not orthonormal, or the body does not have six
-            zero-frequency modes.
+        coarsened
+            Whether `young` (m, 8) is what a coarsening made, which may lie beyond the limits of
+            moduli that users give.
         """
-        return self._solve(
-            young, initial_modes, poisson, lambda model, given: model.element_moduli(given)
-        )
-
-    def solve_coarse(
-        self,
-        moduli: Array | None,
-        initial_modes: Initial | None = None,
-        poisson: float | None = None,
-    ) -> Modes:
-        """The same with the moduli (m, 8) [Pa] that a coarsening made, on rank 0.
-
-        They may lie beyond the limits of those that users give.
-
-        Raises
-        ------
-        UserError
-            For what `carillon.fem.moduli.require_coarse_moduli` refuses.
-        ConvergenceError
-            See `solve`.
-        """
-        return self._solve(
-            moduli,
-            initial_modes,
-            poisson,
-            lambda model, given: require_coarse_moduli(given, model.mesh.n_cells),
-        )
-
-    def _solve(
-        self,
-        young: Array | None,
-        initial_modes: Initial | None,
-        poisson: float | None,
-        moduli_of: Callable[[Solid, Array], Array],
-    ) -> Modes:
         options, phases = self.options, Phases(self.comm, self._verbose)
         with phases("assembly"):
             local_mesh = self.local_mesh
             if self.comm.bcast(young is not None):
                 moduli = compute_on_root(
-                    self.comm, lambda: moduli_of(cast(Solid, self._model), cast(Array, young))
+                    self.comm, lambda: self._moduli(cast(Array, young), coarsened)
                 )
                 local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
             if poisson is not None:
@@ -214,19 +159,22 @@ class ModalSolver:
             pairs.inverse,
         )
 
+    def _moduli(self, young: Array | None, coarsened: bool) -> Array:
+        model, young = cast(Solid, self._model), cast(Array, young)
+        if coarsened:
+            return require_coarse_moduli(young, model.mesh.n_cells)
+        return model.element_moduli(young)
+
     def inverse(self, modes: Modes, shift: float) -> Inverse:
         """(K - shift M)^-1 of the material that `modes` belong to, by the correction's solver."""
         return self._linear.inverse(modes.system, shift)
 
     def _is_of_same_mesh(self, initial_modes: Initial | None) -> TypeGuard[Modes]:
-        """Whether these are modes that this solver found."""
         if not isinstance(initial_modes, Modes):
             return False
         return initial_modes.system.rows.pattern is self._layout.pattern
 
     def _law(self, young: Array | None) -> CountingLaw:
-        """Where the eigenvalues are expected, on every rank."""
-
         def law() -> CountingLaw:
             model = cast(Solid, self._model)
             moduli = model.young if young is None else young
@@ -242,9 +190,7 @@ def _with_method(options: SolverOptions, model: Solid | None) -> SolverOptions:
 
 
 def modal_analysis(
-    model: Solid | None,
-    options: SolverOptions,
-    comm: MPI.Comm = MPI.COMM_WORLD,
+    model: Solid | None, options: SolverOptions, comm: MPI.Comm = MPI.COMM_WORLD
 ) -> Modes:
     """Compute the lowest modes of `model` once, see `ModalSolver`.
 
@@ -259,3 +205,36 @@ def _reporter(visible: bool) -> Callable[[int, float], None] | None:
     if not visible:
         return None
     return lambda step, worst: say(f"  after {step} corrections: eigenvalue error {worst:.1e}")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Partition and symbolic analysis of a mesh, one subdomain a rank.
+
+    Attributes
+    ----------
+    layout, linear
+        Layout of its matrices, and the solver of linear systems with them.
+    """
+
+    local_mesh: LocalMesh
+    layout: Layout
+    linear: LinearSolver
+
+    @classmethod
+    def of_model(cls, model: Solid | None, comm: MPI.Comm) -> Prepared:
+        """Prepare a model, which is None except on rank 0; collective."""
+        return cls.of_mesh(distribute(model, comm.size, comm=comm), comm)
+
+    @classmethod
+    def of_mesh(
+        cls, local_mesh: LocalMesh, comm: MPI.Comm, linear_solver: str = "auto"
+    ) -> Prepared:
+        """Prepare a mesh that is distributed; collective."""
+        layout = Layout.of_local_mesh(local_mesh, comm)
+        return cls(local_mesh, layout, LinearSolver(linear_solver, layout))
+
+    def assembled(self, threads: int = 1) -> System:
+        """Stiffness and mass."""
+        elements = self.local_mesh.cells.elements
+        return assemble(self.local_mesh, self.layout.comm, self.layout, elements, threads)

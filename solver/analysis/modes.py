@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
 from solver.correction.random_start import Approximation
 from solver.linear import Lasting
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -31,8 +29,6 @@ class Modes:
     evidence
         What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
         peak memory.
-    seconds
-        Wall time by phase.
     guard
         (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
         none.

@@ -22,7 +22,6 @@ MISSED = ("fail", "keep")
 """Consequences of a correction that misses its tolerance."""
 LEAST_UNKNOWNS = 4
 """Least number of unknowns for each mode at which `auto` starts from random vectors."""
-
 LEAST_TOLERANCE = 1e-15
 """Smallest relative tolerance that double precision can reach."""
 
@@ -63,12 +62,10 @@ class SolverOptions:
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
     )
     corrections: Steps = option(
-        MAX_CORRECTIONS,
-        "largest number of correction steps; 0 is plain HCMS",
+        MAX_CORRECTIONS, "largest number of correction steps; 0 is plain HCMS"
     )
     retained_modes: NumberOfModes | None = option(
-        None,
-        "modes kept at the root of the merge tree (default: some more than --modes)",
+        None, "modes kept at the root of the merge tree (default: some more than --modes)"
     )
     cutoff: Annotated[float, between(1e-9, 1000000000000000.0)] | None = option(
         None,
@@ -83,8 +80,7 @@ class SolverOptions:
         DEFAULT_INTERFACE, "treatment of interfaces by HCMS"
     )
     seed: Number = option(
-        0,
-        "of random materials, the partition, and the vectors that slepc and arpack start from",
+        0, "of random materials, the partition, and the vectors that slepc and arpack start from"
     )
     check_inertia: bool | None = option(
         None,
@@ -92,8 +88,7 @@ class SolverOptions:
         "and arpack)",
     )
     linear_solver: Annotated[str, OneOf(*linear.METHODS)] = option(
-        "auto",
-        "linear solver of the corrections; auto is the fastest direct one",
+        "auto", "linear solver of the corrections; auto is the fastest direct one"
     )
     acceleration: Annotated[str, OneOf(*ACCELERATIONS)] = option(
         "lanczos", "of the corrections; relaxation is the paper's"
@@ -123,10 +118,7 @@ class SolverOptions:
     def with_method(self, n_dofs: int) -> SolverOptions:
         """The same with a method for `auto`: the fastest of those that the other options allow.
 
-        Raises
-        ------
-        UserError
-            For options that the method has no use for.
+        Raises UserError for options that the method has no use for.
         """
         given = {
             "--retained-modes": self.retained_modes,

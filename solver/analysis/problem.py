@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
@@ -40,8 +40,6 @@ from solver.coarsening.model import build_model
 if TYPE_CHECKING:  # Its import takes long.
     from carillon.fem.finite_cells.covering import Covering
 
-Array = NDArray[np.float64]
-
 DISCRETISATIONS = ("voxel", "finite-cell")
 AUTO = "auto"
 """Name of the choice that is left to the program."""
@@ -59,8 +57,7 @@ class ProblemOptions:
         metavar="NAME|FILE",
     )
     coarsen: Annotated[str, OneOf(AUTO, *COARSENINGS)] = option(
-        "none",
-        f"coarsening of the blocks; {AUTO} is {FOREST} of voxels and none of finite cells",
+        "none", f"coarsening of the blocks; {AUTO} is {FOREST} of voxels and none of finite cells"
     )
     forest: str | None = option(
         None, "forests for --coarsen ddfem (HDF5; default: those of the package)", metavar="FILE"
@@ -76,8 +73,7 @@ class ProblemOptions:
     density: Density = option(DEFAULT_DENSITY)
     lumped: bool = option(False, "lump the mass")
     seed: Number = option(
-        0,
-        "of random materials, the partition, and the vectors that slepc and arpack start from",
+        0, "of random materials, the partition, and the vectors that slepc and arpack start from"
     )
 
     def __post_init__(self) -> None:
@@ -92,10 +88,7 @@ class ProblemOptions:
     def coarsening(self) -> Coarsening | None:
         """The coarsening of the blocks; None if the fine mesh itself is to be analysed.
 
-        Raises
-        ------
-        UserError
-            See `solver.coarsening.choice.make_coarsening`.
+        Raises UserError, see `solver.coarsening.choice.make_coarsening`.
         """
         return make_coarsening(self.coarsen, self.poisson, self.forest, self.objective)
 
@@ -106,20 +99,14 @@ class Problem:
 
     Attributes
     ----------
-    surface
-        The surface that it was made from.
     fine
         Voxels, those of finite cells too.
     young
         (m,) Young's moduli [Pa] of the voxels.
     model
         What is solved: the voxels, coarse elements of them, or finite cells.
-    seconds
-        Wall time by phase.
     coarsening
         What the coarse elements rest on, see `Coarsening.record`.
-    covering
-        The covering by finite cells, if these are solved.
     """
 
     surface: SolidSurface
@@ -158,15 +145,8 @@ class Problem:
 def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) -> Problem:
     """Discretise the solid, assign the material and coarsen.
 
-    Parameters
-    ----------
-    surface
-        The surface of the mesh that `options` name; read if not given.
-
-    Raises
-    ------
-    UserError
-        For anything wrong with the mesh, the material or the parameters.
+    The `surface` of the mesh that `options` name is read if not given. Raises UserError for
+    anything wrong with the mesh, the material or the parameters.
     """
     require_constants(options.poisson, options.density)
     begin = time.perf_counter()
@@ -200,10 +180,7 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
 def discretised(surface: SolidSurface, options: ProblemOptions) -> tuple[HexMesh, Covering | None]:
     """Voxels of a solid, and the covering by finite cells that they belong to, if there is one.
 
-    Raises
-    ------
-    UserError
-        If the surface or the options are of no use.
+    Raises UserError if the surface or the options are of no use.
     """
     triangles, name = surface.triangles, surface.name
     match options.discretisation:

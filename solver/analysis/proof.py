@@ -1,15 +1,21 @@
-"""Ground truth by a general eigensolver, its completion by a count, and the proof of all modes."""
+"""Ground truth by a general eigensolver, its completion by a count, and the proof of all modes.
+
+`Phases` times them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import resource
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from mpi4py import MPI
 
+from carillon.arrays import Array
+from carillon.command_line.progress import say
 from solver.analysis.options import SolverOptions
-from solver.analysis.timing import Phases, peak_memory
 from solver.assembly.system import System
 from solver.reference.truth import (
     RESIDUAL_TOLERANCE,
@@ -27,20 +33,14 @@ from solver.verification.residuals import (
     verify,
 )
 
-Array = NDArray[np.float64]
-
 
 def ground_truth(
     system: System, options: SolverOptions, phases: Phases, evidence: dict[str, Any]
 ) -> Truth:
     """Eigenpairs by SLEPc or ARPACK, counted unless `options` say that they need not be.
 
-    What was found goes into `evidence`, the seconds into `phases`.
-
-    Raises
-    ------
-    ConvergenceError
-        See `solver.reference.truth.solve_truth` and `complete`.
+    What was found goes into `evidence`, the seconds into `phases`. Raises ConvergenceError, see
+    `solver.reference.truth.solve_truth` and `complete`.
     """
     counting = options.check_inertia is not False
     with phases("eigensolver"):
@@ -72,10 +72,7 @@ def completed(
 ) -> Truth:
     """`truth` with the modes that it lacked, which a count of the eigenvalues tells.
 
-    Parameters
-    ----------
-    count
-        What counts the eigenvalues below a value; MUMPS where it is None or gives None.
+    `count` counts the eigenvalues below a value; MUMPS does where it is None or gives None.
     """
     inertia = None
     if can_count():
@@ -106,15 +103,8 @@ def prove(
 ) -> Array:
     """Residual ratios (k,) of eigenpairs, whose properties go into `evidence`; collective.
 
-    Parameters
-    ----------
-    exact
-        Whether they shall be eigenpairs, not just approximations of some.
-
-    Raises
-    ------
-    ConvergenceError
-        If the modes are not orthonormal, or exact ones do not have six rigid motions.
+    `exact` ones shall be eigenpairs, not just approximations of some. Raises ConvergenceError if
+    the modes are not orthonormal, or exact ones do not have six rigid motions.
     """
     with phases("verification"):
         residuals, orthogonality = verify(system, values, vectors)
@@ -128,3 +118,29 @@ def prove(
     if exact:
         require_six_rigid(evidence["rigid_modes"])
     return residuals
+
+
+class Phases:
+    """Adds up wall seconds by phase name; ranks are synchronised at the end of each phase."""
+
+    def __init__(self, comm: MPI.Comm, verbose: bool = False) -> None:
+        self.seconds: dict[str, float] = {}
+        self._comm = comm
+        self._verbose = verbose and comm.rank == 0
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        """Time the body as part of phase `name`."""
+        say(f"{name:<18s}      ...  ", visible=self._verbose, end="\r")
+        begin = time.perf_counter()
+        yield
+        self._comm.barrier()
+        elapsed = time.perf_counter() - begin
+        self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
+        say(f"{name:<18s} {elapsed:8.2f} s", visible=self._verbose)
+
+
+def peak_memory(comm: MPI.Comm) -> int:
+    """Largest peak memory [bytes] of any rank so far."""
+    local = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return int(comm.allreduce(local, op=MPI.MAX))

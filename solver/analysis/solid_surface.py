@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
+from carillon.arrays import Surface
 from carillon.fem.geometry import load_surface, surface_name
 from carillon.fem.geometry.size import doubt_unit
-
-if TYPE_CHECKING:  # Its import takes long, and many commands need no surface.
-    import trimesh
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class SolidSurface:
     """
 
     mesh: str
-    triangles: trimesh.Trimesh
+    triangles: Surface
     unit: float = 1.0
 
     @classmethod

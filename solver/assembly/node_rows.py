@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numba
 import numpy as np
@@ -16,13 +17,13 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.elements import Elements
 from carillon.numerics.simd_width import LANES
 from carillon.processes.threads import in_parallel, split
 from solver.assembly.row_products import multiply
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+Real = TypeVar("Real", np.float64, np.floating)
 
 ENTRIES_AT_ONCE = 4096 * 576
 """Number of entries of element matrices that exist at once while K is assembled."""
@@ -84,33 +85,35 @@ class Pattern:
 
 
 class Halo:
-    """Exchange of the rows that ranks need of each other."""
+    """Exchange of the rows that ranks need of each other, three for a node.
 
-    def __init__(self, pattern: Pattern, starts: Index, comm: MPI.Comm) -> None:
-        """`starts` (ranks + 1,) is the first node of every rank."""
+    Parameters
+    ----------
+    ghosts
+        (g,) numbers of the nodes that this rank needs of others, ascending.
+    start, starts
+        First node of this rank, and (ranks + 1,) of every rank.
+    """
+
+    def __init__(self, ghosts: Index, start: int, starts: Index, comm: MPI.Comm) -> None:
         self._comm = comm
-        bounds = np.searchsorted(pattern.ghosts, starts)
+        bounds = np.searchsorted(ghosts, starts)
         self._received = [
             (rank, bounds[rank], bounds[rank + 1])
             for rank in range(comm.size)
             if bounds[rank] < bounds[rank + 1]
         ]
-        needed = [pattern.ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
-        self._ghosts = len(pattern.ghosts)
+        needed = [ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
+        self._ghosts = len(ghosts)
         asked = comm.alltoall(needed) if comm.size > 1 else [needed[0]]
-        self._sent = [(rank, rows - pattern.start) for rank, rows in enumerate(asked) if len(rows)]
+        self._sent = [(rank, rows - start) for rank, rows in enumerate(asked) if len(rows)]
 
-    @property
-    def neighbours(self) -> int:
-        """Ranks that this one sends to."""
-        return len(self._sent)
-
-    def exchange(self, block: Array) -> Array:
+    def exchange(self, block: NDArray[Real]) -> NDArray[Real]:
         """Rows (3 g, k) of the ghosts, of a block (3 local nodes, k) that every rank passes."""
         if not self._received and not self._sent:
             return block[:0]
         width = 3 * block.shape[1]
-        ghosts = np.empty((self._ghosts, width))
+        ghosts = np.empty((self._ghosts, width), dtype=block.dtype)
         nodes = np.ascontiguousarray(block).reshape(-1, width)
         requests = [
             self._comm.Irecv(ghosts[start:stop], source=rank, tag=_HALO)
@@ -127,8 +130,6 @@ class NodeRows:
 
     Attributes
     ----------
-    pattern
-        Node graph.
     stiffness
         (e, 3, 3) blocks of K [N/m] along the graph.
     mass

@@ -12,15 +12,12 @@ from pathlib import Path
 
 import numpy as np
 from numba import literally
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.numerics import small_gemm
 from carillon.numerics.simd import add_gathered, compiler, sliding, store_tile, zeros
 from carillon.numerics.simd_width import LANES
 from carillon.numerics.small_gemm import WIDE
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 

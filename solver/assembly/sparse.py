@@ -6,9 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import Solid
-
-Array = NDArray[np.float64]
 
 
 def sum_blocks(
@@ -41,10 +40,7 @@ def node_blocks(matrices: Array) -> Array:
 
 
 def assemble_elements(
-    cells: NDArray[np.integer],
-    stiffness: Array,
-    mass: Array,
-    n_nodes: int,
+    cells: NDArray[np.integer], stiffness: Array, mass: Array, n_nodes: int
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Stiffness and mass (both on displacement unknowns) from element matrices.
 
@@ -54,8 +50,6 @@ def assemble_elements(
         (c, k) nodes of each element.
     stiffness, mass
         (c, 3 k, 3 k) and (c, k, k) element matrices.
-    n_nodes
-        Number of nodes.
     """
     nodes = cells.shape[1]
     rows = np.repeat(cells, nodes, axis=1).ravel()

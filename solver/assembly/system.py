@@ -13,18 +13,18 @@ from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import rigid_motions
 from carillon.fem.elements import Elements
+from carillon.processes.petsc import PETSc
 from solver.assembly.node_rows import Halo, NodeRows, Pattern
-from solver.assembly.petsc_matrix import distributed_matrix
 from solver.distribution.collective import compute_on_root, gather_rows
 from solver.distribution.local_mesh import LocalMesh
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)
 
 COLUMNS_GATHERED = 16
@@ -37,8 +37,6 @@ class Layout:
 
     Attributes
     ----------
-    local_mesh
-        This rank's part of the solid.
     pattern, halo
         Node graph of its rows, and the exchange of rows with its neighbours.
     coordinates
@@ -56,7 +54,8 @@ class Layout:
         """Layout of a local mesh; collective."""
         pattern = Pattern.of_cells(local_mesh.cells.corners, local_mesh.start, local_mesh.stop)
         starts = [local_mesh.decomposition.local_range(rank)[0] for rank in range(comm.size)]
-        halo = Halo(pattern, np.array([*starts, local_mesh.decomposition.n_nodes]), comm)
+        starts.append(local_mesh.decomposition.n_nodes)
+        halo = Halo(pattern.ghosts, pattern.start, np.array(starts), comm)
         return cls(local_mesh, pattern, halo, _centred(local_mesh, comm), comm)
 
 
@@ -86,7 +85,7 @@ class System:
     rigid: Array
     mass_rigid: Array
     coordinates: Array
-    nodes: NDArray[np.int64]
+    nodes: Index
     start: int
     stop: int
     n_dofs: int
@@ -125,10 +124,7 @@ class System:
         return local
 
     def stream_to_root(
-        self,
-        block: Array,
-        take: Callable[[Iterator[Array]], None],
-        columns: int = COLUMNS_GATHERED,
+        self, block: Array, take: Callable[[Iterator[Array]], None], columns: int = COLUMNS_GATHERED
     ) -> None:
         """Give `take`, called on rank 0, the block in mesh node order, a few columns at a time.
 
@@ -201,14 +197,8 @@ def assemble(
 
     Parameters
     ----------
-    local_mesh
-        This rank's part of the solid.
-    layout
-        Its layout, if that was made before.
     elements
         Its cells with other moduli than the local mesh's.
-    threads
-        Threads for products with blocks of vectors.
     like
         System of the same layout with other moduli, whose mass and rigid motions it shares.
     """
@@ -248,3 +238,16 @@ def _centred(local_mesh: LocalMesh, comm: MPI.Comm) -> Array:
     extent = np.abs(centred).max(keepdims=True)
     comm.Allreduce(MPI.IN_PLACE, extent, op=MPI.MAX)
     return np.asarray(centred / extent)
+
+
+def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:
+    """Symmetric PETSc matrix from this rank's rows (local, n), in blocks of three unknowns."""
+    local, total = rows.shape
+    csr = (
+        rows.indptr.astype(PETSc.IntType),
+        rows.indices.astype(PETSc.IntType),
+        rows.data.astype(PETSc.ScalarType),
+    )
+    matrix = PETSc.Mat().createAIJ(((local, total), (local, total)), bsize=3, csr=csr, comm=comm)
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return matrix

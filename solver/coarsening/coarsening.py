@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from carillon.errors import UserError
-
-Array = NDArray[np.float64]
 
 
 class Coarsening(ABC):
@@ -31,19 +27,13 @@ class Coarsening(ABC):
     def moduli(self, e: Array) -> Array:
         """Moduli (mc, 8) at the quadrature points, in the unit of the fine ones.
 
-        Parameters
-        ----------
-        e
-            (mc, 8) fine moduli of the blocks' cells, 0 where a cell is void.
+        `e` (mc, 8) are the fine moduli of the blocks' cells, 0 where a cell is void.
         """
 
     def moduli_with_derivatives(self, e: Array) -> tuple[Array, Array]:
         """The same and their derivatives dE_q/de_j (mc, 8 q, 8 j).
 
-        Raises
-        ------
-        UserError
-            If this coarsening has none.
+        Raises UserError if this coarsening has none.
         """
         raise UserError(
             f"coarsening {self.name!r} has no derivatives; choose average, galerkin or ddfem where "

@@ -6,17 +6,16 @@ import hashlib
 from pathlib import Path
 
 import forests
+from carillon.arrays import Array
 from carillon.errors import UserError
 from dataset_gen.objectives import lumped_share
 from forests import default as default_forests
-from solver.coarsening.coarsening import Array, Coarsening
+from solver.coarsening.coarsening import Coarsening
 
 FOREST = "ddfem"
 """Name of coarsening by forests."""
-
 DEFAULT = "default"
 """Name of the forests that come with the package."""
-
 _DIGITS = 16
 
 
@@ -27,8 +26,6 @@ class ForestCoarsening(Coarsening):
     ----------
     source
         File as it was named, or `DEFAULT`.
-    model
-        The forests.
     sha256
         First digits of the file's SHA-256.
     """
@@ -59,10 +56,8 @@ class ForestCoarsening(Coarsening):
 def load_forest(path: str | Path | None, poisson: float) -> ForestCoarsening:
     """Forests of the file `path`, or the default ones, for a solid of this Poisson's ratio.
 
-    Raises
-    ------
-    UserError
-        If there are none, the file is not a model, or they are for another Poisson's ratio.
+    Raises UserError if there are none, the file is not a model, or they are for another Poisson's
+    ratio.
     """
     source = DEFAULT if path is None else str(path)
     file = default_forests.default_path() if path is None else Path(path)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags
 from carillon.errors import UserError
 from carillon.fem.block import ALL_FILLED
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
 from carillon.fem.model import Constants, ElasticModel, fine_model
 from carillon.fem.moduli import at_points, require_moduli
-from solver.coarsening.coarsening import Array, Coarsening
+from solver.coarsening.coarsening import Coarsening
 
 
 def block_moduli(blocks: Blocks, young: Array) -> Array:
@@ -37,26 +37,21 @@ def build_model(
     mesh: HexMesh,
     young: Array,
     coarsening: Coarsening | None = None,
-    refined: NDArray[np.bool_] | None = None,
+    refined: Flags | None = None,
     **constants: Unpack[Constants],
 ) -> ElasticModel:
     """Model of the fine mesh, or of its blocks if there is a coarsening.
 
+    Raises UserError for what `carillon.fem.moduli.require_moduli` refuses.
+
     Parameters
     ----------
-    mesh
-        Fine mesh.
     young
         (m,) modulus [Pa] of each fine cell; without a coarsening also (m, 8).
     refined
         Coarse elements that shall stay fine, see `blocks_from_mesh`.
     constants
         `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
-
-    Raises
-    ------
-    UserError
-        For what `carillon.fem.moduli.require_moduli` refuses.
 
     Examples
     --------

@@ -13,7 +13,6 @@ from solver.verification.comparison import compare_each
 
 OTHER_SHAPE = 0.5
 """Angle [rad] from which two modes are different ones."""
-
 EXAMPLES = """examples:
   compare bunny.h5 truth.h5
   compare coarse.h5 average.h5 truth.h5 --json

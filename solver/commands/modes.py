@@ -10,28 +10,30 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Self
+from typing import Any
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import Solid
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.quantities import Resolution
-from solver.accuracy.options import FIRST_RESOLUTION, DistanceOptions
-from solver.accuracy.solving import AccuracyRequest, Solved, solve_solid
+from solver.accuracy.solving import (
+    FIRST_RESOLUTION,
+    AccuracyRequest,
+    DistanceOptions,
+    Solved,
+    solve_solid,
+)
 from solver.analysis.coarse_start import coarse_start
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Initial
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import make_coarsening
-from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import forest_or_reason
 from solver.commands.modes_summary import REFINED, attributes_of, print_json, print_summary
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
@@ -39,9 +41,8 @@ from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import write_modes
 from solver.linear import petsc_options
+from solver.refinement.errors import RefinementOptions, RefinementStep
 from solver.refinement.model_solver import SolveByOptions
-from solver.refinement.options import RefinementOptions
-from solver.refinement.refine import RefinementStep
 
 EXAMPLES = """examples:
   modes builtin:bell --resolution 32 --out bell.h5
@@ -78,76 +79,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
 
 
-@dataclass(frozen=True)
-class _Request:
-    """What the command line asks for.
-
-    Attributes
-    ----------
-    solid, solver, accuracy
-        The solid, what is computed and how, and how accurate it shall be.
-    refine
-        Whether to start from the modes of the coarsened solid.
-    recorded
-        Parameters for the provenance.
-    """
-
-    solid: ProblemOptions
-    solver: SolverOptions
-    accuracy: AccuracyRequest
-    initial_modes: str | None
-    refine: bool
-    petsc: str | None
-    out: str
-    json: bool
-    recorded: dict[str, Any]
-
-    @classmethod
-    @on_all_ranks()
-    def of_arguments(cls, arguments: argparse.Namespace) -> Self:
-        """From the command line, all errors in it being raised."""
-        distance = collect(DistanceOptions, arguments)
-        resolution = _resolution(arguments.resolution, distance.accuracy)
-        given = argparse.Namespace(**{**vars(arguments), "resolution": resolution})
-        solid, solver = collect(ProblemOptions, given), collect(SolverOptions, given)
-        refine_to = collect(RefinementOptions, given).tolerance(
-            solid.coarsen, solid.discretisation, distance.estimate is not False
-        )
-        initial = arguments.initial_modes
-        if arguments.refine:
-            _require_no_other_start(solid, initial)
-        estimated = distance.is_estimated(solid, solver)
-        accuracy = AccuracyRequest(distance.accuracy, refine_to, estimated, initial)
-        return cls(
-            solid,
-            solver,
-            accuracy,
-            initial,
-            arguments.refine,
-            arguments.petsc,
-            arguments.out,
-            arguments.json,
-            parameters(arguments),
-        )
-
-
 def run(arguments: argparse.Namespace) -> None:
     """Build the solid, solve, verify, write."""
     with on_ranks(arguments.petsc) as comm:
         require_outputs(arguments, comm)
-        request = _Request.of_arguments(arguments)
-        petsc_options.insert_options(request.petsc, request.solver.method)
-        begin = _beginning(request, comm)
-        solve = SolveByOptions(request.solver, comm, sys.stderr.isatty(), begin)
+        solid, solver, accuracy = _options(arguments)
+        petsc_options.insert_options(arguments.petsc, solver.method)
+        begin = _beginning(arguments, solid, comm)
+        solve = SolveByOptions(solver, comm, sys.stderr.isatty(), begin)
         start = time.perf_counter()
-        solved = solve_solid(request.solid, solve, request.solver, request.accuracy, comm, _report)
-        seconds = time.perf_counter() - start
-        attributes = attributes_of(solved, request.solver, request.accuracy, seconds)
-        _write(solved, attributes, request)
+        solved = solve_solid(solid, solve, solver, accuracy, comm, _report)
+        attributes = attributes_of(solved, solver, accuracy, time.perf_counter() - start)
+        _write(solved, attributes, arguments)
         if comm.rank == 0:
             _warn_about_options()
-            show = print_json if request.json else print_summary
-            show(attributes, solved, request.out)
+            show = print_json if arguments.json else print_summary
+            show(attributes, solved, arguments.out)
+
+
+@on_all_ranks()
+def _options(
+    arguments: argparse.Namespace,
+) -> tuple[ProblemOptions, SolverOptions, AccuracyRequest]:
+    """The solid, what is computed and how, and how accurate it shall be."""
+    distance = collect(DistanceOptions, arguments)
+    resolution = _resolution(arguments.resolution, distance.accuracy)
+    given = argparse.Namespace(**{**vars(arguments), "resolution": resolution})
+    solid, solver = collect(ProblemOptions, given), collect(SolverOptions, given)
+    refine_to = collect(RefinementOptions, given).tolerance(
+        solid.coarsen, solid.discretisation, distance.estimate is not False
+    )
+    initial = arguments.initial_modes
+    if arguments.refine:
+        _require_no_other_start(solid, initial)
+    estimated = distance.is_estimated(solid, solver)
+    return solid, solver, AccuracyRequest(distance.accuracy, refine_to, estimated, initial)
 
 
 def _resolution(given: int | None, accuracy: float | None) -> int:
@@ -179,30 +145,24 @@ class _FileStart:
 
 
 def _beginning(
-    request: _Request, comm: MPI.Comm
+    arguments: argparse.Namespace, solid: ProblemOptions, comm: MPI.Comm
 ) -> Callable[[ModalSolver, Solid | None], Initial | None] | None:
-    """What gives the modes that an analysis starts from, if anything does."""
-    if request.refine:
-        coarsening = compute_on_root(comm, lambda: _coarsening(request.solid))
+    if arguments.refine:
+        forest = partial(forest_or_reason, solid.forest, solid.poisson)
+        coarsening = compute_on_root(comm, lambda: forest()[0] or make_coarsening("galerkin"))
         return partial(coarse_start, coarsening=coarsening)
-    return None if request.initial_modes is None else _FileStart(request.initial_modes)
+    return None if arguments.initial_modes is None else _FileStart(arguments.initial_modes)
 
 
-def _coarsening(solid: ProblemOptions) -> Coarsening | None:
-    """What makes the coarse solid to start from."""
-    forest, _ = forest_or_reason(solid.forest, solid.poisson)
-    return forest or make_coarsening("galerkin")
-
-
-def _write(solved: Solved, attributes: dict[str, Any], request: _Request) -> None:
-    """Write the modes file; collective."""
+def _write(solved: Solved, attributes: dict[str, Any], arguments: argparse.Namespace) -> None:
     solid, model, result = solved.solid, solved.model, solved.modes
-    recorded = {**request.recorded, "resolution": solid.resolution, "coarsen": solid.coarsen}
+    chosen = {"resolution": solid.resolution, "coarsen": solid.coarsen}
+    recorded = {**parameters(arguments), **chosen}
 
-    def write(blocks: Iterator[NDArray[np.float64]]) -> None:
+    def write(blocks: Iterator[Array]) -> None:
         assert model is not None
         write_modes(
-            request.out, model, result.values, blocks, result.residuals, attributes, recorded
+            arguments.out, model, result.values, blocks, result.residuals, attributes, recorded
         )
 
     result.system.stream_to_root(result.vectors, write)

@@ -9,8 +9,7 @@ from carillon.fem.geometry.size import sizes_in_words
 from solver.accuracy.solving import AccuracyRequest, Solved
 from solver.analysis.options import SolverOptions
 from solver.files.modes_file import ESTIMATE, FINE_TAKEN, frequencies
-from solver.refinement.errors import FROM_FINE, FROM_SOLID, in_words
-from solver.refinement.refine import DIVIDED_CELLS, FINE_BLOCKS
+from solver.refinement.errors import DIVIDED_CELLS, FINE_BLOCKS, FROM_FINE, FROM_SOLID, in_words
 
 REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
 """Words for what is counted as refined."""
@@ -23,10 +22,7 @@ def attributes_of(
 ) -> dict[str, Any]:
     """Plain values for the modes file, on rank 0; none on the others.
 
-    Parameters
-    ----------
-    elapsed
-        Wall time [s] of all that was solved and estimated on the way.
+    `elapsed` is the wall time [s] of all that was solved and estimated on the way.
     """
     problem, solid, modes = solved.problem, solved.solid, solved.modes
     if problem is None:

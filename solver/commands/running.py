@@ -28,13 +28,7 @@ HIDDEN = ("out", "pictures", "json")
 
 @contextmanager
 def on_ranks(petsc: str | None = None) -> Iterator[MPI.Comm]:
-    """All ranks, with their share of the cores as threads; what PETSc refuses becomes a sentence.
-
-    Parameters
-    ----------
-    petsc
-        Options that the user gave to PETSc.
-    """
+    """All ranks, with their share of the cores; what PETSc refuses of `petsc` is one sentence."""
     comm = MPI.COMM_WORLD
     limit_threads(ranks_of_machine(comm))
     if comm.rank == 0:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
 from solver.subspace.orthonormal import WELL_CONDITIONED, orthonormal
 from solver.subspace.rayleigh_ritz import rayleigh_ritz
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 SMALL_CORRECTION = 1e-6
 """Squared length of corrections of unit vectors below which rounding spoils the identities."""
@@ -63,11 +60,6 @@ class Ritz:
     def locked(self) -> int:
         """Number of locked vectors."""
         return len(self.values) - len(self.active)
-
-    @property
-    def locked_numbers(self) -> Index:
-        """Numbers of the locked vectors."""
-        return np.setdiff1d(np.arange(len(self.values)), self.active)
 
     def lock(self, numbers: Index) -> None:
         """Leave these vectors as they are from now on."""
@@ -121,32 +113,16 @@ def _range(numbers: Index) -> Index | slice:
     return numbers
 
 
-class Step(Protocol):
-    """A step of the iteration: improves the active Ritz vectors in place."""
-
-    def __call__(
-        self,
-        system: System,
-        ritz: Ritz,
-        corrections: Array,
-        numbers: Index,
-        inverse: Inverse,
-        width: int,
-    ) -> None:
-        """`corrections` (local, a) solve for the residuals of the vectors `numbers`."""
+Step = Callable[[Ritz, Array, Index, Inverse, int], None]
+"""A step of the iteration: improves active Ritz vectors (m,) by `corrections` (local, a), which
+solve for the residuals of the vectors `numbers` (a,)."""
 
 
-def enrich(
-    system: System,
-    ritz: Ritz,
-    corrections: Array,
-    numbers: Index,
-    inverse: Inverse,
-    width: int,
-) -> None:
+def enrich(ritz: Ritz, corrections: Array, numbers: Index, inverse: Inverse, width: int) -> None:
     """Rayleigh-Ritz in the span of the active vectors and their corrections.
 
-    Of the result as many vectors stay that the whole has `width`.
+    Of the result as many vectors stay that the whole has `width`. Raises ConvergenceError if a Ritz
+    value is not positive, which rounding alone can cause.
 
     Notes
     -----
@@ -154,13 +130,9 @@ def enrich(
     span, so the projections of K follow from those of M: X^T K Z = mu X^T M Z, and
     R^T Z = (mu - Theta) X^T M Z.  Where some X are locked, or solutions are inexact or very small,
     Z is multiplied by K.
-
-    Raises
-    ------
-    ConvergenceError
-        If a Ritz value is not positive, which rounding alone can cause.
     """
-    Z, overlap, gram, untouched = _independent(system, ritz, corrections)
+    system = ritz.system
+    Z, overlap, gram, untouched = _independent(ritz, corrections)
     if inverse.exact and untouched and np.diag(gram).min(initial=1.0) > SMALL_CORRECTION:
         mu = inverse.shift
         across = mu * overlap
@@ -175,8 +147,7 @@ def enrich(
 
     # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
     values, of_all, of_corrections = bcast_from_root(
-        system.comm,
-        lambda: _lowest(ritz.values, ritz.active, overlap, gram, across, stiff, keep),
+        system.comm, lambda: _lowest(ritz.values, ritz.active, overlap, gram, across, stiff, keep)
     )
     if len(values) and values[0] <= 0.0:
         raise ConvergenceError(
@@ -188,14 +159,12 @@ def enrich(
     ritz.replace_active(values, vectors)
 
 
-def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Array, bool]:
+def _independent(ritz: Ritz, Z: Array) -> tuple[Array, Array, Array, bool]:
     """Z, or a basis of what it adds to X, well-conditioned enough to orthonormalise by Cholesky.
 
-    Returns
-    -------
-    tuple[Array, Array, Array, bool]
-        The columns (local, a), X^T M Z, Z^T M Z, and whether Z was good as it is.
+    Also returns X^T M Z, Z^T M Z, and whether Z (local, a) was good as it is.
     """
+    system = ritz.system
     for passes in range(MOST_PASSES):
         Z -= system.rigid @ system.inner(system.mass_rigid, Z)
         overlap = system.inner(ritz.mass_vectors, Z)
@@ -215,7 +184,8 @@ def _independent(system: System, ritz: Ritz, Z: Array) -> tuple[Array, Array, Ar
 
 def _outside(overlap: Array, gram: Array) -> Array:
     """Gram matrix of the part of Z outside X."""
-    return _symmetric(gram - overlap.T @ overlap)
+    outside = gram - overlap.T @ overlap
+    return np.asarray(0.5 * (outside + outside.T))
 
 
 def _lowest(
@@ -223,10 +193,7 @@ def _lowest(
 ) -> tuple[Array, Array, Array]:
     """Lowest pairs of the pencil projected on the active X and the part of Z outside X.
 
-    Returns
-    -------
-    tuple[Array, Array, Array]
-        Values (k,), and coefficients of X (m, k) and of Z (a, k).
+    They are values (k,), and coefficients of X (m, k) and of Z (a, k).
     """
     basis, _ = orthonormal(_outside(overlap, gram))
     # Q = (Z - X C) T is orthonormal and orthogonal to X; K X is Theta M X within the subspace.
@@ -245,29 +212,18 @@ def _lowest(
     return values[:keep], of_all, of_basis
 
 
-def relax(
-    system: System,
-    ritz: Ritz,
-    corrections: Array,
-    numbers: Index,
-    inverse: Inverse,
-    width: int,
-) -> None:
+def relax(ritz: Ritz, corrections: Array, numbers: Index, inverse: Inverse, width: int) -> None:
     """Rayleigh-Ritz in the span of X - w Z, the over-relaxed subspace iteration of the paper.
 
     The weight w = 1 + theta / (theta + theta_p) / 2 grows from 1 for the lowest modes, which
     converge fast, towards 1.25 for the last (a mild choice of Bathe & Ramaswamy 1980).
     """
-    values = ritz.values[numbers]
+    system, values = ritz.system, ritz.values[numbers]
     weight = 1.0 + 0.5 * np.abs(values) / (np.abs(values) + ritz.values.max())
     iterated = ritz.vectors[:, ritz.active]
     position = np.searchsorted(ritz.active, numbers)
     iterated[:, position] -= corrections * weight
-    locked = ritz.locked_numbers
+    locked = np.setdiff1d(np.arange(len(ritz.values)), ritz.active)
     iterated -= ritz.vectors[:, locked] @ system.inner(ritz.mass_vectors[:, locked], iterated)
     values, vectors = rayleigh_ritz(system, iterated, max(0, width - ritz.locked))
     ritz.replace_active(values, vectors)
-
-
-def _symmetric(matrix: Array) -> Array:
-    return np.asarray(0.5 * (matrix + matrix.T))

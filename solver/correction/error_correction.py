@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, default_guard
@@ -18,8 +18,6 @@ from solver.correction.subspace_iteration import SubspaceIteration
 from solver.linear import Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
 from solver.subspace.start import every_unknown, start_block
-
-Array = NDArray[np.float64]
 
 BLOCKS_OF_A_STEP = 3
 """Number of blocks that a step of conjugate gradients spans: modes, residuals and directions."""
@@ -49,17 +47,15 @@ def correct(
     Accurate modes are locked.  With `lanczos` the first step is a whole block Lanczos iteration
     from all modes together, see `solver.correction.lanczos`; what it leaves undone, and any start
     that is nearly good enough, is for `krylov`, as everything is with `icc-pcg`.  With `amg-cg`
-    every step takes one cycle of multigrid, see `solver.correction.lobpcg`.
+    every step takes one cycle of multigrid, see `solver.correction.lobpcg`. Raises ConvergenceError
+    if `tolerance` is positive and not reached, unless that is to be kept; or if the vectors
+    collapse to too few.
 
     Parameters
     ----------
     start
         (local, q) approximate modes, q > requested for a margin; None for random vectors, which
         only multigrid begins with.
-    requested
-        Number of elastic modes to correct.
-    linear
-        Solver of the linear systems.
     values
         (q,) Ritz values of `start`, if its columns are mass-orthonormal Ritz vectors orthogonal to
         the rigid motions; otherwise a Rayleigh-Ritz step makes such of them first.
@@ -79,12 +75,6 @@ def correct(
     keep
         Whether a correction that does not reach `tolerance`, stagnates, or has a linear system that
         `linear` cannot solve returns what it has.
-
-    Raises
-    ------
-    ConvergenceError
-        If `tolerance` is positive and not reached, unless that is to be kept; or if the vectors
-        collapse to too few.
 
     Notes
     -----
@@ -155,25 +145,12 @@ def _by_gradients(
         if start is None:
             start = inverse.precondition(system.times_mass(start_block(system, width, 0)))
         start = start[:, :width]
-        result = lobpcg(
-            system, inverse.precondition, start, requested, tolerance, max_steps, report
-        )
+        return lobpcg(system, inverse.precondition, start, requested, tolerance, max_steps, report)
     finally:
         inverse.destroy()
-    return Correction(
-        result.values[:requested],
-        np.ascontiguousarray(result.vectors[:, :requested]),
-        result.errors,
-        np.ascontiguousarray(result.vectors[:, requested:]),
-        result.steps,
-        result.solves,
-        result.steps + 1,
-        result.history,
-    )
 
 
 def _whole(values: Array, vectors: Array, requested: int) -> Correction:
-    """Ritz pairs of the whole space, which are eigenpairs."""
     exact = np.full(requested, np.finfo(float).eps)
     lowest = np.ascontiguousarray(vectors[:, :requested])
     return Correction(values[:requested], lowest, exact, vectors[:, requested:])

@@ -1,4 +1,10 @@
-"""Krylov space of (K - mu M)^-1 M by blocks, and the Ritz pairs in it."""
+"""Krylov space of (K - mu M)^-1 M by blocks, and the Ritz pairs in it.
+
+The Krylov spaces of `solver.hcms.lowest` and of `sound.design` share `swept` and `whitening`; this
+one is spread over ranks, and its projected operator is what orthogonalisation has removed, where
+those project K anew.  Its blocks become orthonormal by Cholesky, theirs by eigenvectors of the Gram
+matrix: one code for all would change last bits.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +12,13 @@ from functools import partial
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
 from solver.subspace.basis import BlockBasis
 from solver.subspace.orthonormal import largest_share, orthonormal
-
-Array = NDArray[np.float64]
 
 PESSIMISM = 3.0
 """Least ratio of the error bounds of the operator's eigenvalues to the errors of the Ritz values of
@@ -41,12 +45,7 @@ resolved."""
 class KrylovBasis:
     """Orthonormal basis of the Krylov space, with the projected operator.
 
-    Attributes
-    ----------
-    size, blocks
-        Dimension reached, and with how many blocks.
-    remainder
-        (local, b) the orthonormal block that comes next.
+    Its `remainder` (local, b) is the orthonormal block that comes next.
     """
 
     def __init__(self, system: System, inverse: Inverse, start: Array, capacity: int) -> None:
@@ -218,7 +217,7 @@ class KrylovBasis:
         return values, self._vectors.combine(np.concatenate([rigid, weights]), block, of_last)
 
 
-def _lowest(inverted: Array, shift: float, count: int) -> tuple[NDArray[np.int64], Array]:
+def _lowest(inverted: Array, shift: float, count: int) -> tuple[Index, Array]:
     """Numbers and values of the `count` lowest eigenvalues shift + 1 / inverted, none negative.
 
     Those of motions with hardly any stiffness are zero but for rounding; what they are in truth is

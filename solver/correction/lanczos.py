@@ -11,15 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.assembly.system import System
 from solver.correction.krylov import KrylovBasis
 from solver.correction.shift import MOST
 from solver.linear import Inverse
 from solver.subspace.start import start_block
-
-Array = NDArray[np.float64]
 
 DECADES = 2.0
 """Decades by which a block reduces the error at least, assumed until two looks have measured it."""
@@ -27,6 +25,21 @@ HIGHEST_SHIFT = 0.8
 """Largest shift, as a share of the last requested eigenvalue."""
 LONGEST = 4
 """Largest dimension of the space, as a multiple of the modes requested."""
+COLUMNS, FEWEST_COLUMNS = 64, 16
+"""Greatest and least width of the block. A narrow one takes fewer right-hand sides, a wide one less
+time for each."""
+MIXED_IN_COLUMN = 4
+"""Number of requested modes in a column, which the Krylov space has to separate."""
+END_WEIGHT = 2.0
+"""Exponent of a mode's distance to the shift, by which it enters the first block."""
+LEAST_WEIGHT = 1e-3
+"""Least weight of a mode as a share of the greatest, since the shift may be an eigenvalue."""
+MIXED = 1.15
+"""Modes that enter the block as a multiple of those requested, in case some are out of order."""
+ROUGH = 1e-3
+"""Tolerance above which only requested modes enter, so that fewer steps separate them."""
+FIRST_LOOK = 1.25
+"""Dimension of the space at the first look at its Ritz values, as a multiple of the modes mixed."""
 
 
 @dataclass
@@ -77,14 +90,8 @@ def lanczos(
         Exact, with the shift mu between zero and the last wanted eigenvalue.
     start
         (local, b) first block, see `starting_block.mixed` and `solver.subspace.start.start_block`.
-    requested
-        Number of modes to become accurate.
     width
         Number of modes to return, as far as there are so many.
-    tolerance
-        Relative eigenvalue error to stop at.
-    first_look
-        Dimension of the space at the first look at its Ritz values.
     seed
         Of the random vectors that go on where a block is exhausted.
 
@@ -129,25 +136,15 @@ def is_too_high(system: System, inverse: Inverse, requested: int, last: float) -
     """Whether it would take long to find the first modes with this shift.
 
     Where eigenvalues are crowded, as those of symmetric solids, a good shift may lie close below
-    the last one, so that those below it are counted as well.
-
-    Parameters
-    ----------
-    last
-        About the last of the `requested` elastic eigenvalues.
+    the last one, so that those below it are counted as well. `last` is about the last of the
+    `requested` elastic eigenvalues.
     """
     below = inverse.negative - system.rigid.shape[1]
     return inverse.shift > HIGHEST_SHIFT * last and below > MOST * requested
 
 
 class _Looks:
-    """When to look at the Ritz values, which costs a dense eigenproblem each time.
-
-    Attributes
-    ----------
-    next
-        Dimension at the next look.
-    """
+    """When to look at the Ritz values, which costs a dense eigenproblem each time."""
 
     def __init__(self, tolerance: float, first: int, columns: int) -> None:
         self.next = first
@@ -170,3 +167,61 @@ class _Looks:
         # A little early: one block too many costs more than one look.
         self.next = size + max(1, int(0.8 * np.log10(error / self._tolerance) / rate))
         return False
+
+
+def mixed(
+    system: System,
+    values: Array,
+    vectors: Array,
+    requested: int,
+    shift: float,
+    tolerance: float,
+    columns: int | None = None,
+) -> tuple[Array, int]:
+    """A first block (local, b) of approximate modes, and when to look first.
+
+    Parameters
+    ----------
+    values, vectors
+        (q,) and (local, q) approximate pairs, orthogonal to the rigid motions, q >= requested.
+    columns
+        Width of the block, if modes are not so near as those of HCMS.
+    """
+    count, look = requested, 1.0
+    if tolerance <= ROUGH:
+        count, look = min(len(values), int(MIXED * requested)), FIRST_LOOK
+    modes = vectors[:, :count]
+    columns = min(columns or _columns(requested), requested)
+    signs = _signs(system, modes)
+    return _mixture(values[:count], modes, signs, shift, columns), int(look * count)
+
+
+def _columns(requested: int) -> int:
+    """Width of a block: few modes in each column, and whole vector registers."""
+    narrow = max(-(-requested // MIXED_IN_COLUMN), FEWEST_COLUMNS)
+    return min(-(-narrow // 8) * 8, COLUMNS)
+
+
+def _signs(system: System, modes: Array) -> Array:
+    """Signs (k,) that make each mode point along one fixed pattern over the rows.
+
+    LAPACK finds a mode with either sign, as rounding has it, which differs with the number of
+    threads.  Another mixture would agree to the tolerance; the same one agrees to rounding.
+    """
+    pattern = np.cos(np.arange(3.0 * system.start, 3.0 * system.stop))
+    along = system.inner(pattern[:, None], modes)[0]
+    return np.where(along < 0.0, -1.0, 1.0)
+
+
+def _mixture(values: Array, modes: Array, signs: Array, shift: float, columns: int) -> Array:
+    """The modes in few columns (local, b), those next to each other in different ones.
+
+    Those far from the shift, which need most steps, enter with most weight.
+    """
+    count = len(values)
+    weight = np.abs(values - shift) ** END_WEIGHT
+    weight = np.maximum(weight, LEAST_WEIGHT * weight.max())
+    number = np.arange(count)
+    mixture = np.zeros((count, columns))
+    mixture[number, number % columns] = signs * weight / weight.max()
+    return np.asarray(modes @ mixture)

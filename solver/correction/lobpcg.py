@@ -7,19 +7,17 @@ W, and the direction P that the last step took.  A cycle of multigrid is the pre
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.errors import ConvergenceError
 from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System
+from solver.correction.result import Correction
 from solver.distribution.collective import bcast_from_root
 from solver.subspace.orthonormal import orthonormal
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, reduced_eigenpairs
-
-Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 2048
 """Number of rows of the basis that are multiplied together and written back."""
@@ -32,30 +30,6 @@ LEFT = 0.5
 """Error of an eigenvalue that may be left after a step, as a share of the last reduction."""
 
 
-@dataclass
-class LobpcgResult:
-    """Ritz pairs of the last step.
-
-    Attributes
-    ----------
-    values, vectors
-        (m,) and (local, m), ascending, orthogonal to the rigid motions.
-    errors
-        (requested,) estimated relative errors of the lowest values.
-    steps, solves
-        Steps made, and residuals that were preconditioned.
-    history
-        Largest estimated error before each step, and at the end.
-    """
-
-    values: Array
-    vectors: Array
-    errors: Array
-    steps: int
-    solves: int
-    history: list[float]
-
-
 def lobpcg(
     system: System,
     precondition: Callable[[Array], Array],
@@ -64,8 +38,10 @@ def lobpcg(
     tolerance: float,
     max_steps: int,
     report: Callable[[int, float], None] | None = None,
-) -> LobpcgResult:
+) -> Correction:
     """Lowest elastic modes from a block of approximate ones.
+
+    Raises ConvergenceError if the start spans too few modes, or the error stops falling.
 
     Parameters
     ----------
@@ -73,19 +49,8 @@ def lobpcg(
         Symmetric approximation of K^-1 on blocks (local, k).
     start
         (local, m) vectors, more than requested: the last ones converge slowly.
-    requested
-        Modes to become accurate.
     tolerance
         Relative eigenvalue error to stop at; zero makes all steps.
-    max_steps
-        Steps allowed.
-    report
-        Called with the step and the largest estimated error.
-
-    Raises
-    ------
-    ConvergenceError
-        If the start spans too few modes, or the error stops falling.
 
     Notes
     -----
@@ -131,17 +96,21 @@ def lobpcg(
         moving = errors[active] > 0.1 * tolerance
         basis.step(image[:, moving], active[moving])
         active = np.flatnonzero(errors > 0.1 * tolerance)
-    return LobpcgResult(basis.values, basis.vectors, errors[:requested], step, solves, history)
+    vectors = basis.vectors
+    return Correction(
+        basis.values[:requested],
+        np.ascontiguousarray(vectors[:, :requested]),
+        errors[:requested],
+        np.ascontiguousarray(vectors[:, requested:]),
+        step,
+        solves,
+        step + 1,
+        history,
+    )
 
 
 class _Trial:
-    """X, P and W side by side, and their products with K and M.
-
-    Attributes
-    ----------
-    values
-        (m,) Ritz values of X, ascending.
-    """
+    """X, P and W side by side, and their products with K and M."""
 
     def __init__(self, system: System, values: Array, vectors: Array) -> None:
         self._system = system
@@ -157,13 +126,13 @@ class _Trial:
         """X (local, m)."""
         return np.ascontiguousarray(self._block[:, : self._width])
 
-    def residual(self, numbers: NDArray[np.int64]) -> Array:
+    def residual(self, numbers: Index) -> Array:
         """K x - theta M x of some vectors."""
         residual = self._mass[:, numbers] * -self.values[numbers]
         residual += self._stiff[:, numbers]
         return residual
 
-    def step(self, image: Array, numbers: NDArray[np.int64]) -> None:
+    def step(self, image: Array, numbers: Index) -> None:
         """Replace X by the lowest Ritz vectors of the span of X, P and `image` (local, w).
 
         `numbers` (w,) are the vectors whose directions are kept for the next step.

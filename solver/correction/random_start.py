@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
-from solver.correction.lanczos import Lanczos, lanczos
+from solver.correction.lanczos import Lanczos, lanczos, mixed
 from solver.correction.shift import AIM, inverse_amid, is_amid
-from solver.correction.starting_block import mixed
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.start import start_block
 from solver.subspace.weyl import CountingLaw
-
-Array = NDArray[np.float64]
 
 MODES_OF_EIGHT, FEWEST_COLUMNS, MOST_COLUMNS = 100, 8, 24
 """Number of modes for every eight columns of the first block, and its least and greatest width. A
@@ -71,23 +66,18 @@ def from_nothing(
 ) -> LanczosStart:
     """Lowest elastic modes from random vectors, or from the modes of a coarser model.
 
+    Raises ConvergenceError if every shift is an eigenvalue.
+
     Parameters
     ----------
     requested, accurate, width
         Number of modes requested, of those to become accurate, and of those to return.
     law
         Where eigenvalues are expected, for the shift.
-    tolerance
-        Relative eigenvalue error to stop at.
     seed
         Of the random vectors, which do not depend on the number of ranks.
     near
         Modes to begin with, more than requested.
-
-    Raises
-    ------
-    ConvergenceError
-        If every shift is an eigenvalue.
 
     Notes
     -----
@@ -110,13 +100,7 @@ def from_nothing(
         given = None
         if near is not None:
             start, look = mixed(
-                system,
-                near.values,
-                near.vectors,
-                requested,
-                inverse.shift,
-                tolerance,
-                columns,
+                system, near.values, near.vectors, requested, inverse.shift, tolerance, columns
             )
         result = lanczos(system, inverse, start, accurate, width, tolerance, look, seed + 1)
         if result.too_high and attempt < ATTEMPTS - 1:
@@ -131,6 +115,5 @@ def from_nothing(
 
 
 def _columns(requested: int, n_dofs: int) -> int:
-    """Width of the first block, in whole vector registers."""
     fewest = FEWEST_COLUMNS if n_dofs <= NEAR else 2 * FEWEST_COLUMNS
     return min(max(8 * -(-requested // MODES_OF_EIGHT), fewest), MOST_COLUMNS)

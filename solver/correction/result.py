@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from carillon.arrays import Array
 from solver.linear import Lasting
-
-Array = NDArray[np.float64]
 
 
 @dataclass

@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.correction.criteria import IMPROVED_GUARDS, LOOSE, carried_count, default_guard
 from solver.correction.enrichment import Ritz, Step, enrich, relax
 from solver.correction.krylov import ZERO_FRACTION
-from solver.correction.lanczos import is_too_high, lanczos
+from solver.correction.lanczos import is_too_high, lanczos, mixed
 from solver.correction.random_start import LanczosStart
 from solver.correction.result import Correction
-from solver.correction.starting_block import mixed
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Approximate, Inverse, Lasting, LinearSolver
 from solver.subspace.rayleigh_ritz import rayleigh_ritz, safe_shift
-from solver.subspace.spectrum import WEYL_EXPONENT
-
-Array = NDArray[np.float64]
+from solver.subspace.weyl import WEYL_EXPONENT
 
 TYPICAL = 0.1
 """Largest median of the errors, as a share of the tolerance."""
@@ -133,7 +130,7 @@ class SubspaceIteration:
                 raise
             self.solves += correction.shape[1]
             self.blocks += 1
-            self.step(self.system, self.ritz, correction, active, inverse, self.width)
+            self.step(self.ritz, correction, active, inverse, self.width)
             step += 1
             self._require_independent(step)
             if observe is not None:
@@ -199,7 +196,6 @@ class SubspaceIteration:
             )
 
     def _nearly_accurate(self) -> float:
-        """Error, as a multiple of the tolerance, below which `krylov` is the faster one."""
         return NEARLY_ACCURATE * (1.0 if self.similar is None else FOLLOWED)
 
     def _inverse(self, step: int, tolerance: float) -> Inverse:
@@ -237,7 +233,6 @@ class SubspaceIteration:
             self.made = None
 
     def _last(self) -> float:
-        """Ritz value of the last wanted mode, the same on all ranks."""
         return float(np.sort(self.ritz.values)[self.requested - 1])
 
     def _shift(self) -> float:
@@ -246,11 +241,10 @@ class SubspaceIteration:
         return self._last() * (TOP_FRACTION if self._only_top_is_left() else self.share)
 
     def _only_top_is_left(self) -> bool:
-        """Whether just modes at the end of those wanted are not accurate yet."""
         lowest = float(self.ritz.values[self.ritz.active].min(initial=np.inf))
         return self.ritz.locked > 0 and lowest > TOP * self._last()
 
-    def _residuals(self, tolerance: float) -> tuple[Array, Array, NDArray[np.int64]]:
+    def _residuals(self, tolerance: float) -> tuple[Array, Array, Index]:
         """Errors of the wanted modes, and residuals of those to improve with their numbers.
 
         Wanted modes that have become accurate are locked.  A block Lanczos iteration has told
@@ -280,7 +274,7 @@ class SubspaceIteration:
         ritz.lock(accurate)
         return errors, residual[:, chosen], candidates[chosen]
 
-    def _estimate(self, candidates: NDArray[np.int64], residual: Array) -> Array:
+    def _estimate(self, candidates: Index, residual: Array) -> Array:
         values = self.ritz.values[candidates]
         last = self._first_beyond()
         rows = self.system.rows

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Index
 from carillon.fem.model import Solid
 from solver.distribution.partition import default_subdomains, partition_model
 from solver.distribution.tree import MergeTree, assign_ranks, build_tree
@@ -33,7 +34,7 @@ class Decomposition:
 
     tree: MergeTree
     owner: NDArray[np.int32]
-    offsets: NDArray[np.int64]
+    offsets: Index
 
     @property
     def n_nodes(self) -> int:
@@ -60,21 +61,13 @@ class Decomposition:
 
 def decompose(
     model: Solid, subdomains: int | None = None, seed: int = 0, ranks: int = 1
-) -> tuple[Decomposition, NDArray[np.int64]]:
+) -> tuple[Decomposition, Index]:
     """Cut a solid into subdomains, build the merge tree and deal subdomains to the ranks.
 
     The cut and the tree depend on the number of ranks only where there are more ranks than
-    subdomains by default.
-
-    Returns
-    -------
-    tuple[Decomposition, NDArray[np.int64]]
-        The decomposition and the nodes (n,) in its order: by subdomain, then by number.
-
-    Raises
-    ------
-    UserError
-        If there are more subdomains than cells, or more ranks than subdomains.
+    subdomains by default. Returns the decomposition and the nodes (n,) in its order: by subdomain,
+    then by number. Raises UserError if there are more subdomains than cells, or more ranks than
+    subdomains.
     """
     node_part = _partition(model, subdomains, seed, ranks)
     tree, renumbered = build_tree(node_part[model.connectivity], np.bincount(node_part))

@@ -8,13 +8,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.model import Solid
-from solver.distribution.collective import bcast_from_root
+from solver.distribution.collective import AnyArray, bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.decomposition import Decomposition, decompose
-from solver.distribution.messages import AnyArray, receive_arrays, send_arrays
-
-Array = NDArray[np.float64]
 
 _LOCAL_MESH, _MODULI = 10, 12
 
@@ -23,15 +21,10 @@ _LOCAL_MESH, _MODULI = 10, 12
 class Cells:
     """Some cells of the mesh with their material.
 
-    Attributes
-    ----------
-    corners
-        (c, k) rows of the nodes, see `Decomposition`.
-    elements
-        Size and material of the cells.
+    `corners` (c, k) are the rows of their nodes, see `Decomposition`.
     """
 
-    corners: NDArray[np.int64]
+    corners: Index
     elements: Elements
 
     def __len__(self) -> int:
@@ -47,7 +40,7 @@ class Cells:
         pairs = zip(self.arrays(), others.arrays(), strict=True)
         return self.from_arrays([np.concatenate(pair) for pair in pairs])
 
-    def inside(self, start: int, stop: int) -> NDArray[np.bool_]:
+    def inside(self, start: int, stop: int) -> Flags:
         """Whether each node (c, k) is one of the rows [start, stop)."""
         return (self.corners >= start) & (self.corners < stop)
 
@@ -87,9 +80,9 @@ class LocalMesh:
     start: int
     stop: int
     cells: Cells
-    nodes: NDArray[np.int64]
+    nodes: Index
     positions: Array
-    numbers: NDArray[np.int64]
+    numbers: Index
     origin: Array
 
     @property
@@ -97,12 +90,12 @@ class LocalMesh:
         """Number of unknowns of the whole solid."""
         return 3 * self.decomposition.n_nodes
 
-    def lattice(self) -> NDArray[np.int64]:
+    def lattice(self) -> Index:
         """Integer coordinates (stop - start, 3) of this rank's nodes, in `Elements.edge`."""
         positions = (self.positions - self.origin) / self.cells.elements.edge
         return np.rint(positions).astype(np.int64)
 
-    def cells_by_subdomain(self, parts: range) -> dict[int, NDArray[np.int64]]:
+    def cells_by_subdomain(self, parts: range) -> dict[int, Index]:
         """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""
         corner_part = np.searchsorted(self.decomposition.offsets, self.cells.corners, side="right")
         part, cell = _incidences(corner_part - 1)
@@ -118,19 +111,15 @@ def distribute(
 ) -> LocalMesh:
     """Cut the solid on rank 0 and give every rank its part.
 
+    Raises UserError on every rank, if there are more subdomains than cells or more ranks than
+    subdomains.
+
     Parameters
     ----------
     model
         The solid; only rank 0's is looked at, the others may pass None.
     subdomains
         Number of subdomains; from the number of unknowns if not given.
-    seed
-        Seed of the partition.
-
-    Raises
-    ------
-    UserError
-        On every rank, if there are more subdomains than cells or more ranks than subdomains.
     """
     order = np.empty(0, dtype=np.int64)
 
@@ -155,10 +144,7 @@ def distribute(
 def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -> LocalMesh:
     """A rank's part of the solid with other moduli.
 
-    Parameters
-    ----------
-    young
-        (c, p) moduli [Pa] of all elements, see `Solid.element_moduli`; only rank 0's are looked at.
+    `young` (c, p) are the moduli [Pa] of all elements, see `Solid.element_moduli`, on rank 0.
     """
     everyone = comm.gather(local_mesh.numbers)
     if comm.rank == 0:
@@ -179,8 +165,8 @@ def with_poisson(local_mesh: LocalMesh, poisson: float) -> LocalMesh:
 
 
 def _scatter(
-    model: Solid, decomposition: Decomposition, order: NDArray[np.int64], comm: MPI.Comm
-) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
+    model: Solid, decomposition: Decomposition, order: Index, comm: MPI.Comm
+) -> tuple[Index, Array, Index, Cells]:
     """Send every rank its nodes, their positions, its cells' numbers and cells; return rank 0's."""
     row = np.empty(len(order), dtype=np.int64)
     row[order] = np.arange(len(order))
@@ -190,7 +176,7 @@ def _scatter(
     rank_of, cell = _incidences(np.searchsorted(ends, corners, side="right"))
     first = np.searchsorted(rank_of, np.arange(comm.size + 1))
 
-    def part(rank: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Cells]:
+    def part(rank: int) -> tuple[Index, Array, Index, Cells]:
         start, stop = decomposition.local_range(rank)
         nodes = order[start:stop].copy()
         numbers = cell[first[rank] : first[rank + 1]].copy()
@@ -202,9 +188,7 @@ def _scatter(
     return part(0)
 
 
-def _incidences(
-    corner_owner: NDArray[np.integer],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _incidences(corner_owner: NDArray[np.integer]) -> tuple[Index, Index]:
     """Pairs (owner, cell) from the owner (c, k) of each node, each once, sorted."""
     count = max(len(corner_owner), 1)
     cell = np.arange(len(corner_owner), dtype=np.int64)[:, None]

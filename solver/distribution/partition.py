@@ -8,6 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
 from carillon.fem.aggregation import levels_of
 from carillon.fem.geometry import HexMesh
@@ -58,12 +59,12 @@ def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int3
     return _without_gaps(_clusters(_embedding(values, vectors), parts, seed))
 
 
-def _embedding(values: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _embedding(values: Array, vectors: Array) -> Array:
     """Points (m, d) by commute-time weights: their distances follow those along the solid."""
     return vectors[:, 1:] / np.sqrt(np.maximum(values[1:], 1e-12))
 
 
-def _clusters(points: NDArray[np.float64], count: int, seed: int) -> NDArray[np.integer]:
+def _clusters(points: Array, count: int, seed: int) -> NDArray[np.integer]:
     """Cluster (n,) of each point (n, d) by k-means++ (Arthur & Vassilvitskii 2007).
 
     SciPy's where they are few: to load scikit-learn takes longer than to solve a small model.
@@ -124,10 +125,7 @@ def partition_nodes(
 def partition_model(model: Solid, parts: int, seed: int = 0) -> NDArray[np.int32]:
     """Subdomain (n,) of each node: about `parts` connected sets, numbered without gaps, none empty.
 
-    Raises
-    ------
-    UserError
-        If there are more parts than cells.
+    Raises UserError if there are more parts than cells.
     """
     cells, n_nodes = model.connectivity, model.mesh.n_nodes
     node_part = partition_nodes(cells, n_nodes, partition_cells(model.hexmesh, parts, seed))
@@ -166,7 +164,7 @@ def connect_subdomains(
     return node_part
 
 
-def subdomain_pieces(cells: NDArray[np.integer], node_part: NDArray[np.int32]) -> NDArray[np.int64]:
+def subdomain_pieces(cells: NDArray[np.integer], node_part: NDArray[np.int32]) -> Index:
     """Number (n,) of the piece that each node belongs to; a piece lies in one subdomain.
 
     Nodes of a subdomain hang together if a cell has `FEWEST_HOLDING` of them or more: fewer hold
@@ -219,11 +217,8 @@ def _join(above, left, right):  # type: ignore[no-untyped-def]
 
 
 def _closest_neighbours(
-    cells: NDArray[np.integer],
-    node_part: NDArray[np.int32],
-    piece: NDArray[np.int64],
-    asked: NDArray[np.bool_],
-) -> NDArray[np.int64]:
+    cells: NDArray[np.integer], node_part: NDArray[np.int32], piece: Index, asked: Flags
+) -> Index:
     """Other subdomain that shares most corners of cells with each piece that is `asked` about.
 
     -1 without one, and for the other pieces.

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
 
 LIGHTEST = 0.4
@@ -61,7 +62,8 @@ def build_tree(
     """Merge tree whose partners are of comparable size and share large interfaces low in the tree.
 
     The subdomains are bisected recursively where they share few cells: what is cut first is merged
-    last.
+    last. Returns the tree, and the new number (parts,) of each subdomain: leaves of the tree from
+    left to right.
 
     Parameters
     ----------
@@ -69,12 +71,6 @@ def build_tree(
         (m, k) subdomain of every node of every cell.
     sizes
         (parts,) nodes of every subdomain.
-
-    Returns
-    -------
-    tuple[MergeTree, NDArray[np.int32]]
-        The tree, and the new number (parts,) of each subdomain: leaves of the tree from left to
-        right.
 
     Notes
     -----
@@ -87,7 +83,7 @@ def build_tree(
     leaves: list[int] = []
     joins: list[_Branch] = []
 
-    def grow(members: NDArray[np.int64]) -> _Branch:
+    def grow(members: Index) -> _Branch:
         if len(members) == 1:
             leaves.append(int(members[0]))
             return _Branch(group=len(leaves) - 1)
@@ -128,7 +124,7 @@ def shared_cells(corner_part: NDArray[np.int32], parts: int) -> sp.csr_matrix:
     return shared
 
 
-def _bisect(weight: sp.csr_matrix, sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _bisect(weight: sp.csr_matrix, sizes: Array) -> Flags:
     """One side (k,), the first member's, of a light and even cut through a graph of k members.
 
     Members are taken in the order of each of the graph's lowest eigenvectors, and cut where the
@@ -153,19 +149,19 @@ def _bisect(weight: sp.csr_matrix, sizes: NDArray[np.float64]) -> NDArray[np.boo
 class _Cut:
     """Two sides of a graph, the edges between them, and the share of the lighter one."""
 
-    left: NDArray[np.int64]
-    right: NDArray[np.int64]
+    left: Index
+    right: Index
     edges: float
     evenness: float
 
-    def side(self) -> NDArray[np.bool_]:
+    def side(self) -> Flags:
         """Mask of the members on the side of the first."""
         side = np.zeros(len(self.left) + len(self.right), dtype=bool)
         side[self.left] = True
         return side if side[0] else ~side
 
 
-def _cuts(weight: NDArray[np.float64], sizes: NDArray[np.float64]) -> list[_Cut]:
+def _cuts(weight: Array, sizes: Array) -> list[_Cut]:
     """Cuts through the orders of the graph's lowest eigenvectors, those of fewest edges first."""
     degree = weight.sum(axis=1)
     _, vectors = np.linalg.eigh(np.diag(degree) - weight)
@@ -186,13 +182,10 @@ def _pieces(graph: sp.csr_matrix) -> int:
     return int(connected_components(graph, directed=False, return_labels=False))
 
 
-def assign_ranks(costs: NDArray[np.float64], ranks: int) -> NDArray[np.int32]:
+def assign_ranks(costs: Array, ranks: int) -> NDArray[np.int32]:
     """Owner rank of each subdomain: contiguous ranges, none empty, the costliest least so.
 
-    Raises
-    ------
-    UserError
-        If there are more ranks than subdomains.
+    Raises UserError if there are more ranks than subdomains.
 
     Examples
     --------
@@ -219,7 +212,7 @@ def assign_ranks(costs: NDArray[np.float64], ranks: int) -> NDArray[np.int32]:
     return np.repeat(np.arange(ranks, dtype=np.int32), counts)
 
 
-def _filled(ends: NDArray[np.float64], ranks: int, limit: float) -> list[int]:
+def _filled(ends: Array, ranks: int, limit: float) -> list[int]:
     """End of each rank's range when every rank takes as much as `limit`, leaving one each."""
     stops: list[int] = []
     stop = 0

@@ -7,19 +7,16 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import Solid
 from carillon.files.datasets import INTEGER, find, finite, read
 from carillon.files.hdf5 import open_h5
-from solver.distribution.collective import bcast_from_root
+from solver.distribution.collective import bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh
-from solver.distribution.messages import receive_arrays, send_arrays
 from solver.files.modes_file import KIND, SCHEMA
-
-Array = NDArray[np.float64]
 
 COLUMNS = 16
 """Number of modes that travel together."""
@@ -31,19 +28,14 @@ def modes_from_file(
 ) -> Array:
     """This rank's rows (local unknowns, k) of the modes in a file.
 
+    Raises UserError on every rank, if the file is unusable, of another mesh, or holds fewer modes.
+
     Parameters
     ----------
     path
         A modes file of the same mesh, of any material; read by rank 0, a few modes at a time.
     model
         The solid whose modes are wanted, on rank 0.
-    modes
-        Number of modes wanted.
-
-    Raises
-    ------
-    UserError
-        On every rank, if the file is unusable, of another mesh, or holds fewer modes.
     """
 
     def check() -> int:
@@ -72,7 +64,6 @@ def modes_from_file(
 
 
 def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
-    """Modes of the file in blocks."""
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         modes = find(file, "modes", (None, count))
         for first in range(0, count, COLUMNS):

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.block import ALL_FILLED, NODES
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
@@ -18,8 +19,6 @@ from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import at_points
 from carillon.files.datasets import INTEGER, number, read, refused
 from carillon.limits import DENSITIES, EDGES, POISSON
-
-Array = NDArray[np.float64]
 
 FINITE_CELLS = "finite_cells"
 """Name of the group of a solid of finite cells."""
@@ -76,10 +75,7 @@ def _put_elements(group: h5py.Group, model: ElasticModel) -> None:
 def get_model(group: h5py.Group) -> Solid:
     """Read a solid written by `put_model`.
 
-    Raises
-    ------
-    UserError
-        If it is incomplete or its parts do not fit each other.
+    Raises UserError if it is incomplete or its parts do not fit each other.
     """
     if FINITE_CELLS in group:
         return _finite_cell_model(group)

@@ -10,8 +10,8 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import RIGID_MODES, Solid
@@ -20,8 +20,6 @@ from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
 from carillon.records.measurement import measured
 from solver.files.model_group import get_model, put, put_model
-
-Array = NDArray[np.float64]
 
 KIND = "modes"
 SCHEMA = 1
@@ -83,6 +81,8 @@ def write_modes(
 ) -> None:
     """Write a modes file atomically.
 
+    Raises UserError if the file cannot be written.
+
     Parameters
     ----------
     modes
@@ -94,11 +94,6 @@ def write_modes(
     more
         Writes what else the file shall hold, under names that are not taken.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be written.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
@@ -109,8 +104,9 @@ def write_modes(
     >>> with TemporaryDirectory() as folder:
     ...     path = f"{folder}/modes.h5"
     ...     write_modes(path, solid, np.zeros(1), [rigid], np.zeros(1), {"method": "by hand"}, {})
-    ...     read_modes(path).attributes["method"]
-    'by hand'
+    ...     file = read_modes(path)
+    >>> file.attributes["method"], file.frequencies.tolist()
+    ('by hand', [0.0])
     """
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         put_eigenvalues(file, eigenvalues)
@@ -148,24 +144,8 @@ def put_modes(group: h5py.Group, blocks: Iterable[Array], shape: tuple[int, int]
 def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
     """Read a modes file.
 
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, of another schema, or inconsistent: everything in it is a
-        finite number, eigenvalues ascend, and the parts fit each other.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from carillon.fem.geometry import hexmesh_from_grid
-    >>> from carillon.fem.model import fine_model
-    >>> cube = hexmesh_from_grid(np.zeros((1, 3), int), np.zeros(3), 1.0)
-    >>> solid, rigid = fine_model(cube, np.ones(1)), np.tile([[1.0], [0.0], [0.0]], (8, 1))
-    >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/modes.h5"
-    ...     write_modes(path, solid, np.zeros(1), [rigid], np.zeros(1), {}, {})
-    ...     read_modes(path).frequencies.tolist()
-    [0.0]
+    Raises UserError if the file is missing, damaged, of another schema, or inconsistent: everything
+    in it is a finite number, eigenvalues ascend, and the parts fit each other.
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
@@ -186,10 +166,7 @@ def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
 def read_elastic(path: str | Path) -> ModesFile:
     """Read a modes file that holds elastic modes, whose frequencies one can divide by.
 
-    Raises
-    ------
-    UserError
-        See `read_modes`; or if there is none, or one at zero frequency.
+    Raises UserError, see `read_modes`; or if there is none, or one at zero frequency.
     """
     return require_elastic(read_modes(path), path)
 
@@ -197,10 +174,7 @@ def read_elastic(path: str | Path) -> ModesFile:
 def require_elastic(file: ModesFile, name: str | Path) -> ModesFile:
     """The contents of a file, `name` in messages, if they hold elastic modes.
 
-    Raises
-    ------
-    UserError
-        If there is none, or one at zero frequency.
+    Raises UserError if there is none, or one at zero frequency.
     """
     if len(file.eigenvalues) <= RIGID_MODES:
         raise UserError(
@@ -218,10 +192,7 @@ def require_elastic(file: ModesFile, name: str | Path) -> ModesFile:
 def require_same_solid(paths: Sequence[str | Path], files: Sequence[ModesFile]) -> None:
     """Check that files are of one solid: boxes around it that agree to cells of the coarsest mesh.
 
-    Raises
-    ------
-    UserError
-        If one differs from the first.
+    Raises UserError if one differs from the first.
     """
     corners = [file.mesh.bounds for file in files]
     for path, file, box in zip(paths, files, corners, strict=True):
@@ -239,10 +210,7 @@ def require_same_solid(paths: Sequence[str | Path], files: Sequence[ModesFile]) 
 def get_eigenvalues(group: h5py.Group) -> Array:
     """Eigenvalues (k,) [rad^2/s^2], ascending but for the rounding of those of rigid motions.
 
-    Raises
-    ------
-    UserError
-        If they are missing, not finite, out of order, or negative beyond rounding.
+    Raises UserError if they are missing, not finite, out of order, or negative beyond rounding.
     """
     values = read(group, "eigenvalues", (None,)).astype(float, copy=False)
     if not len(values):

@@ -19,7 +19,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array, Flags
+
 Indices = NDArray[np.integer]
 
 INTERFACES = ("overlapping", "free", "fixed")
@@ -30,10 +31,7 @@ _NON_COLLINEAR = 3
 
 
 def restrict_stiffness(
-    stiffness: Array,
-    inside: NDArray[np.bool_],
-    interface: str,
-    collinear: NDArray[np.bool_] | None = None,
+    stiffness: Array, inside: Flags, interface: str, collinear: Flags | None = None
 ) -> Array:
     """Element stiffness (c, 3 k, 3 k) restricted to the nodes `inside` (c, k); others are zero.
 
@@ -80,6 +78,6 @@ def _schur(
     return np.asarray(0.5 * (schur + schur.transpose(0, 2, 1)))
 
 
-def restrict_mass(mass: Array, inside: NDArray[np.bool_]) -> Array:
+def restrict_mass(mass: Array, inside: Flags) -> Array:
     """Nodal element mass (c, k, k) restricted to the nodes `inside`: the principal sub-matrix."""
     return np.asarray(mass * inside[:, :, None] * inside[:, None, :])

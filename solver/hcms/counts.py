@@ -16,10 +16,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solver.distribution.messages import Sent
+from carillon.arrays import Array
+from solver.distribution.collective import Sent
 from solver.hcms.lowest import BLOCK_FRACTION, STEPS
-
-Array = NDArray[np.float64]
 
 SHARED_COST = 1.8
 """Time of an operation of ScaLAPACK on two ranks over one of LAPACK, for orders of 450 to 800."""
@@ -80,8 +79,6 @@ class Counts:
 
     Attributes
     ----------
-    local, down, basis
-        Tallies of these phases.
     merges
         Tally of each level of the merge tree, from the subdomains up.
     """

@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from solver.distribution.messages import Sent, receive_arrays, send_arrays
+from carillon.arrays import Array
+from solver.distribution.collective import Sent, receive_arrays, send_arrays
 from solver.hcms.counts import Tally, product_flops
-
-Array = NDArray[np.float64]
 
 _ASKED, _ANSWERED = 23, 24
 _PRODUCT, _TRANSPOSED = 0, 1
 
 
 class Crew:
-    """A rank and those that help it; they call `help_with_products` until it calls `dismiss`.
-
-    Parameters
-    ----------
-    comm
-        All ranks.
-    helpers
-        Those that help, maybe none.
-    tally
-        What this rank does is added to it.
-    """
+    """A rank and those that help it; they call `help_with_products` until it calls `dismiss`."""
 
     def __init__(self, comm: MPI.Comm, helpers: tuple[int, ...], tally: Tally) -> None:
         self.comm = comm

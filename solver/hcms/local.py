@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.elements import Elements
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.node_rows import NodeRows, Pattern
@@ -23,9 +23,6 @@ from solver.distribution.local_mesh import Cells
 from solver.hcms.condense import restrict_mass, restrict_stiffness
 from solver.hcms.lowest import STEPS, all_modes, lowest_modes, ritz_pairs
 from solver.linear.plan import Plan
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 ZERO_FRACTION = 1e-10
 """Local eigenvalue, as a fraction of the ratio of the diagonals, below which it is a rigid
@@ -38,8 +35,6 @@ class Region:
 
     Attributes
     ----------
-    pattern, plan
-        Node graph and elimination plan.
     lattice
         (n, 3) integer coordinates of the nodes.
     pieces
@@ -69,14 +64,10 @@ class Subdomain:
 
     Parameters
     ----------
-    cells
-        The cells that touch the subdomain.
     start, stop
         Half-open range of the subdomain's rows.
     lattice
         (stop - start, 3) integer coordinates of its nodes.
-    treatment
-        Interface treatment.
     """
 
     def __init__(self, cells: Cells, start: int, stop: int, lattice: Index, treatment: str) -> None:
@@ -99,31 +90,20 @@ class Subdomain:
             self.pattern = self.region.pattern
 
     def modes(
-        self,
-        elements: Elements,
-        keep: int,
-        cutoff: float | None = None,
-        steps: int = STEPS,
+        self, elements: Elements, keep: int, cutoff: float | None = None, steps: int = STEPS
     ) -> tuple[Array, Array]:
         """Lowest modes of the subdomain.
 
+        Returns values (k,) [rad^2/s^2] and mass-orthonormal vectors (3 (stop - start), k), with
+        which the stiffness of the subdomain by itself is diagonal.
+
         Parameters
         ----------
-        elements
-            Material of the cells.
         keep
             Wanted number of modes; more come back if there are more motions without strain, all of
             which are kept, and never fewer than the six rigid ones.
         cutoff
             Eigenvalue [rad^2/s^2] up to which all modes come back, instead of `keep`.
-        steps
-            Of the eigensolver, see `solver.hcms.lowest`.
-
-        Returns
-        -------
-        tuple[Array, Array]
-            Values (k,) [rad^2/s^2] and mass-orthonormal vectors (3 (stop - start), k), with which
-            the stiffness of the subdomain by itself is diagonal.
         """
         stiffness, mass = elements.stiffness(), elements.nodal_mass()
         alone = NodeRows(self.pattern)
@@ -168,7 +148,7 @@ def _up_to(cutoff: float | None, values: Array, vectors: Array) -> tuple[Array, 
 
 
 def _lattice_around(
-    numbers: Index, inside: NDArray[np.bool_], places: Index, first: int, lattice: Index, nodes: int
+    numbers: Index, inside: Flags, places: Index, first: int, lattice: Index, nodes: int
 ) -> Index:
     """Integer coordinates (nodes, 3) of all nodes, from those of the nodes inside.
 

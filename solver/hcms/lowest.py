@@ -6,21 +6,19 @@ smooth motions will do; Rayleigh-Ritz at the end makes them orthonormal and diag
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 
 import numpy as np
 import scipy.linalg as la
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from solver.assembly.node_rows import NodeRows
 from solver.linear.multifrontal import Factor
 from solver.linear.plan import Plan
-from solver.subspace.orthonormal import is_cancelled
-from solver.subspace.spectrum import WEYL_EXPONENT
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from solver.subspace.orthonormal import swept, whitening
+from solver.subspace.weyl import WEYL_EXPONENT
 
 DENSE_UNKNOWNS = 200
 """Largest number of unknowns at which LAPACK finds all pairs as fast."""
@@ -34,8 +32,6 @@ accurate by themselves, and where later steps err more."""
 FIRST_SHIFT_FRACTION, SHIFT_FRACTION = 0.05, 0.3
 """Shifts as shares of the last requested eigenvalue, estimated from the start and after one
 step."""
-INDEPENDENT = 1e-10
-"""Squared share of the basis below which a direction is dropped."""
 WELL_CONDITIONED = 1e-4
 """Squared share of the basis below which vectors are orthonormalised twice."""
 LEAST_BLOCK = 24
@@ -51,24 +47,19 @@ def lowest_modes(
 ) -> tuple[Array, Array]:
     """About the lowest `count` eigenpairs of K x = lambda M x; K may be singular.
 
+    Returns values (count,) ascending and M-orthonormal vectors (3 n, count), Ritz pairs of each
+    other: the values are upper bounds, and close for all but the last ones.
+
     Parameters
     ----------
     rows
         All of K and M, M positive definite.
-    plan
-        Of their node graph.
     lattice
         (n, 3) integer coordinates of the nodes.
     pieces
         (n,) number of the piece that each node belongs to, if there are several.
     steps
         Blocks added to the start block and its first correction.
-
-    Returns
-    -------
-    tuple[Array, Array]
-        Values (count,) ascending and M-orthonormal vectors (3 n, count), Ritz pairs of each other:
-        the values are upper bounds, and close for all but the last ones.
     """
     size = 3 * len(lattice)
     if size <= DENSE_UNKNOWNS or count > DENSE_FRACTION * size:
@@ -107,12 +98,8 @@ def _krylov(
     block = basis if width is None else np.ascontiguousarray(basis[:, -width:])
     for _ in range(steps):
         block = factor.solve(rows.times_mass(block))
-        inside = _sweep(rows, basis, block)
-        gram = block.T @ rows.times_mass(block)
-        if is_cancelled(gram, inside):
-            # Twice is enough.
-            _sweep(rows, basis, block)
-            gram = block.T @ rows.times_mass(block)
+        # Twice is enough.
+        _, gram = swept(block, partial(_sweep, rows, basis), rows.times_mass, 2)
         block, coefficients = _independent(rows, block, gram, basis)
         block = block @ coefficients
         basis = np.concatenate([basis, block], axis=1)
@@ -134,31 +121,29 @@ def _extrapolated(values: Array, count: int) -> float:
 
 def ritz_pairs(rows: NodeRows, block: Array) -> tuple[Array, Array]:
     """Ritz values and M-orthonormal Ritz vectors of the span of `block` (3 n, k)."""
-    block, whitening = _independent(rows, block)
+    block, coefficients = _independent(rows, block, block.T @ rows.times_mass(block))
     stiff = block.T @ rows.times_stiffness(block)
-    reduced = whitening.T @ stiff @ whitening
+    reduced = coefficients.T @ stiff @ coefficients
     values, rotation = np.linalg.eigh(0.5 * (reduced + reduced.T))
-    return values, block @ (whitening @ rotation)
+    return values, block @ (coefficients @ rotation)
 
 
 def _independent(
-    rows: NodeRows, block: Array, gram: Array | None = None, basis: Array | None = None
+    rows: NodeRows, block: Array, gram: Array, basis: Array | None = None
 ) -> tuple[Array, Array]:
     """Columns that span what `block` does, and coefficients that make them orthonormal.
 
     What rounding has left in them of an M-orthonormal `basis` is magnified with directions that are
     few in the block, and removed again.
     """
-    if gram is None:
-        gram = block.T @ rows.times_mass(block)
-    whitening, condition = _whitening(gram)
-    if condition < WELL_CONDITIONED:
+    coefficients, kept = whitening(gram)
+    if kept[0] / kept[-1] < WELL_CONDITIONED:
         # Twice is enough.
-        block = block @ whitening
+        block = block @ coefficients
         if basis is not None:
             _sweep(rows, basis, block)
-        whitening, _ = _whitening(block.T @ rows.times_mass(block))
-    return block, whitening
+        coefficients, _ = whitening(block.T @ rows.times_mass(block))
+    return block, coefficients
 
 
 def smooth_motions(lattice: Index, count: int, pieces: Index | None = None) -> Array:
@@ -199,16 +184,3 @@ def _degrees(extent: tuple[float, ...], count: int) -> list[tuple[int, ...]]:
 
 def _wave_number(degrees: tuple[int, ...], extent: tuple[float, ...]) -> float:
     return sum((degree / side) ** 2 for degree, side in zip(degrees, extent, strict=True))
-
-
-def _whitening(gram: Array) -> tuple[Array, float]:
-    """Coefficients that make vectors with this Gram matrix orthonormal, dependent ones dropped.
-
-    Also returns the least share (squared) of a direction that was kept.
-    """
-    scale = 1.0 / np.sqrt(np.diag(gram))
-    spread, directions = np.linalg.eigh(gram * scale * scale[:, None])
-    independent = spread > INDEPENDENT * spread[-1]
-    kept = spread[independent]
-    whitening = scale[:, None] * directions[:, independent] / np.sqrt(kept)
-    return whitening, float(kept[0] / kept[-1])

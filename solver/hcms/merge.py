@@ -16,19 +16,16 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import RIGID_MODES
 from solver.assembly.sparse import assemble_elements
+from solver.distribution.collective import AnyArray
 from solver.distribution.local_mesh import Cells
-from solver.distribution.messages import AnyArray
 from solver.hcms.condense import restrict_stiffness
 from solver.hcms.counts import Tally, eigen_flops, sparse_product_flops
 from solver.hcms.distributed_products import Crew
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 ZERO_FRACTION = 1e-10
 """A reduced eigenvalue below this fraction of the largest is a rigid motion's."""
@@ -55,11 +52,11 @@ class Group:
     start: int
     stop: int
     values: Array
-    boundary: Rows
+    boundary: Index
     modes: Array
     cells: Cells
 
-    def modes_at(self, rows: Rows) -> Array:
+    def modes_at(self, rows: Index) -> Array:
         """The kept modes (3 len(rows), k) at some rows of the boundary."""
         if len(rows) == len(self.boundary):
             return self.modes
@@ -76,7 +73,7 @@ def group_from_arrays(arrays: list[AnyArray], start: int, stop: int, like: Cells
     return Group(start, stop, values, boundary, modes, like.from_arrays(cells))
 
 
-def boundary_of(cells: Cells, start: int, stop: int) -> tuple[Rows, Cells]:
+def boundary_of(cells: Cells, start: int, stop: int) -> tuple[Index, Cells]:
     """Rows of [start, stop) with a neighbour outside, and the cells in which they have it.
 
     `cells` are at least those that straddle the boundary, each once.
@@ -102,30 +99,15 @@ class Interface:
         On the unknowns of `left`, then those of `right`.
     """
 
-    left: Rows
-    right: Rows
+    left: Index
+    right: Index
     stiffness: sp.csr_matrix
     mass: sp.csr_matrix
 
-    @property
-    def stiffness_left(self) -> sp.csr_matrix:
-        """Block dK11."""
-        return self.stiffness[: 3 * len(self.left), : 3 * len(self.left)]
-
-    @property
-    def stiffness_right(self) -> sp.csr_matrix:
-        """Block dK22."""
-        return self.stiffness[3 * len(self.left) :, 3 * len(self.left) :]
-
-    @property
-    def stiffness_across(self) -> sp.csr_matrix:
-        """Block dK21, rows of the right group."""
-        return self.stiffness[3 * len(self.left) :, : 3 * len(self.left)]
-
-    @property
-    def mass_across(self) -> sp.csr_matrix:
-        """Block dM21, rows of the right group."""
-        return self.mass[3 * len(self.left) :, : 3 * len(self.left)]
+    def blocks(self, matrix: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+        """Blocks 11, 22 and 21 of either matrix, the last with rows of the right group."""
+        split = 3 * len(self.left)
+        return matrix[:split, :split], matrix[split:, split:], matrix[split:, :split]
 
 
 def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) -> Interface:
@@ -170,7 +152,7 @@ def across_mass(left: Group, right: Group, between: Interface, crew: Crew) -> Ar
     if between.mass.nnz == 0:
         return None
     modes = left.modes_at(between.left), right.modes_at(between.right)
-    return project(modes[1], between.mass_across, modes[0], crew)
+    return project(modes[1], between.blocks(between.mass)[2], modes[0], crew)
 
 
 class Reduced(NamedTuple):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
+from solver.distribution.collective import AnyArray, Sent, receive_arrays, send_arrays
 from solver.distribution.local_mesh import Cells, LocalMesh
-from solver.distribution.messages import AnyArray, Sent, receive_arrays, send_arrays
 from solver.distribution.tree import Merge
 from solver.hcms.counts import Counts, Tally
 from solver.hcms.distributed_products import Crew, help_with_products
@@ -26,17 +25,13 @@ from solver.hcms.merge import (
     project,
     reduced_pencil,
 )
+from solver.hcms.scalapack import shared_pairs
 from solver.hcms.schedule import Schedule, modes_to_keep
-from solver.hcms.shared import shared_pairs
-
-Array = NDArray[np.float64]
 
 _UP = 11
 
 
 class _Whole(NamedTuple):
-    """Two groups that one rank has, and the reduced pencil of their merge."""
-
     left: Group
     right: Group
     pencil: Reduced
@@ -47,14 +42,8 @@ class Ascent:
 
     Parameters
     ----------
-    local_mesh
-        This rank's part of the solid.
-    plan
-        Who makes which merge.
     groups
         The subdomains of this rank, by number; merged ones are taken out, and the others' put in.
-    keep, cutoff, treatment
-        As `solver.hcms.synthesis.synthesize` has them.
 
     Attributes
     ----------
@@ -138,10 +127,11 @@ class Ascent:
         )
         between = self._interface(step, left.cells)
         modes = left.modes_at(between.left), right.modes_at(between.right)
+        within_left, within_right, across = between.blocks(between.stiffness)
         stiffness = (
-            project(modes[0], between.stiffness_left, modes[0], crew),
-            project(modes[1], between.stiffness_right, modes[1], crew),
-            project(modes[1], between.stiffness_across, modes[0], crew),
+            project(modes[0], within_left, modes[0], crew),
+            project(modes[1], within_right, modes[1], crew),
+            project(modes[1], across, modes[0], crew),
         )
         mass = across_mass(left, right, between, crew)
         return _Whole(left, right, reduced_pencil((left.values, right.values), stiffness, mass))
@@ -161,18 +151,16 @@ class Ascent:
         if not here:
             self._send(mine.arrays(), partner, tally)
         between = self._interface(step, mine.cells)
-        if ours == step.left:
-            rows, stiffness = between.left, between.stiffness_left
-        else:
-            rows, stiffness = between.right, between.stiffness_right
-        modes = mine.modes_at(rows)
+        side = 0 if ours == step.left else 1
+        *within, coupling = between.blocks(between.stiffness)
+        modes = mine.modes_at((between.left, between.right)[side])
         if here:
             self._send([modes], partner, tally)
-        own = project(modes, stiffness, modes, crew)
+        own = project(modes, within[side], modes, crew)
         if not here:
             (others,) = self._receive(partner, tally)
             left_modes, right_modes = (modes, others) if ours == step.left else (others, modes)
-            across = project(right_modes, between.stiffness_across, left_modes, crew)
+            across = project(right_modes, coupling, left_modes, crew)
             self._send([own, across], partner, tally)
             return None
         other = self._receive_group(theirs, partner, tally)

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.block import degrees_of_freedom
 from carillon.processes.threads import in_parallel
+from solver.distribution.collective import receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh
-from solver.distribution.messages import receive_arrays, send_arrays
 from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.counts import Counts, krylov_flops, product_flops
 from solver.hcms.local import Subdomain
@@ -27,8 +27,6 @@ from solver.hcms.lowest import FEWER_STEPS, STEPS
 from solver.hcms.merge import Group, boundary_of
 from solver.hcms.merge_tree import Ascent
 from solver.hcms.schedule import modes_to_keep, schedule
-
-Array = NDArray[np.float64]
 
 FEW_SUBDOMAINS = 8
 """Largest number of subdomains at which the accuracy of their modes matters."""
@@ -45,8 +43,6 @@ class Synthesis:
         (k,) Ritz values [rad^2/s^2], ascending, on every rank.
     vectors
         (local unknowns, k) this rank's rows, row-major.
-    counts
-        What this rank did for them.
     """
 
     values: Array
@@ -86,16 +82,10 @@ def synthesize(
 
     Parameters
     ----------
-    local_mesh
-        This rank's part of the solid.
     keep
         Modes kept at the root; groups below keep `modes_to_keep`.
-    treatment
-        Interface treatment, see `solver.hcms.condense`.
     subdomains
         Their geometry, if `make_subdomains` was called before with the same treatment.
-    threads
-        Threads that share the subdomains of this rank.
     cutoff
         Eigenvalue [rad^2/s^2] up to which groups below the root keep their modes, instead of a
         number of them.
@@ -120,18 +110,6 @@ def synthesize(
 
 
 class _Climb:
-    """One rank's part in the modes of the subdomains, and in what becomes of them.
-
-    Attributes
-    ----------
-    groups
-        Groups that this rank holds and that have not been merged yet.
-    bases
-        (3 nodes, k) local modes of this rank's subdomains.
-    ascent
-        The merges.
-    """
-
     def __init__(
         self, local_mesh: LocalMesh, keep: int, treatment: str, comm: MPI.Comm, cutoff: float | None
     ) -> None:

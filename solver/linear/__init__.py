@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
 from carillon.processes.memory import available_memory
 from solver.distribution.collective import bcast_from_root, ranks_of_machine
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     from solver.linear.iterative import IterativeInverse
     from solver.linear.leader import Leader
     from solver.linear.plan import Plan
-
-Array = NDArray[np.float64]
 
 METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
 ITERATIVE = ("icc-pcg", "amg-cg")
@@ -57,10 +56,7 @@ class Inverse(Protocol):
 class Lasting:
     """An inverse on one rank to keep for similar materials: nothing but arrays, never to be freed.
 
-    Attributes
-    ----------
-    diagonal
-        (local unknowns,) of its stiffness [N/m].
+    Its `diagonal` (local unknowns,) is that of its stiffness [N/m].
     """
 
     exact = True
@@ -128,7 +124,8 @@ class Approximate:
 class LinearSolver:
     """Makes inverses of one mesh for any material and shift.
 
-    What depends on the mesh alone is computed once, here.
+    What depends on the mesh alone is computed once, here. Raises UserError for an unknown method,
+    or `multifrontal` on ranks of several machines.
 
     Parameters
     ----------
@@ -138,13 +135,6 @@ class LinearSolver:
         Cholesky, the paper's.  `amg-cg`: conjugate gradients with algebraic multigrid, for models
         too large to factorise.  `auto`: the fastest direct one that the memory holds, or else
         `amg-cg`.
-    layout
-        Of the mesh.
-
-    Raises
-    ------
-    UserError
-        For an unknown method, or `multifrontal` on ranks of several machines.
     """
 
     def __init__(self, method: str, layout: Layout) -> None:
@@ -204,7 +194,7 @@ class LinearSolver:
             alone = system.comm.size == 1
             return Lasting(inverse, system.rows.stiffness_diagonal) if alone else inverse
         if self.method == "mumps":
-            from solver.linear.mumps import MumpsInverse
+            from solver.linear.factorisation import MumpsInverse
 
             return MumpsInverse(system, shift)
         return self.iterative(system, shift)

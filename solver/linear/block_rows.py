@@ -11,22 +11,16 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.processes.threads import in_parallel, split
+from solver.assembly.node_rows import Halo
 
 Array = NDArray[np.floating]
 
 SIDE = 3
 """Rows and columns of a block; the levels of the multigrid have three or six unknowns a node."""
-_ROWS = 22
 
 
 class BlockRows:
-    """This rank's rows of a sparse matrix, square or not, whose sizes are multiples of three.
-
-    Attributes
-    ----------
-    shape
-        Local rows and local columns.
-    """
+    """This rank's rows of a sparse matrix, square or not, whose sizes are multiples of three."""
 
     def __init__(self, matrix: Any, comm: MPI.Comm, dtype: Any, threads: int) -> None:
         """Copy the rows of `matrix` (AIJ); collective."""
@@ -41,12 +35,14 @@ class BlockRows:
         blocks = rows.tobsr((SIDE, SIDE))
         self.shape = (shape[0], stop - start)
         self._indptr, self._columns, self._blocks = blocks.indptr, blocks.indices, blocks.data
-        self._exchange = _Exchange(ghosts, start, stop, comm)
+        starts = np.array([*comm.allgather(start), comm.allreduce(stop - start)])
+        self._halo = Halo(nodes, start // SIDE, starts // SIDE, comm)
         self._threads = threads
 
     def add_product(self, block: Array, result: Array, sign: float = 1.0) -> None:
         """Add `sign` times the product with `block` (local columns, k) to `result`; collective."""
-        whole = self._exchange.with_ghosts(block)
+        ghosts = self._halo.exchange(block)
+        whole = np.concatenate([block, ghosts]) if len(ghosts) else block
 
         def rows(start: int, stop: int) -> None:
             _add_product(
@@ -67,39 +63,6 @@ class BlockRows:
         row = np.repeat(np.arange(len(self._indptr) - 1), np.diff(self._indptr))
         own = self._columns == row
         return np.ascontiguousarray(np.einsum("nii->ni", self._blocks[own])).ravel()
-
-
-class _Exchange:
-    """Fetches the rows of a block that other ranks own."""
-
-    def __init__(self, ghosts: NDArray[np.integer], start: int, stop: int, comm: MPI.Comm) -> None:
-        self._comm = comm
-        self._count = len(ghosts)
-        starts = np.array([*comm.allgather(start), comm.allreduce(stop - start)])
-        bounds = np.searchsorted(ghosts, starts)
-        pieces = [ghosts[first:last] for first, last in zip(bounds[:-1], bounds[1:])]
-        self._received = [
-            (rank, bounds[rank], bounds[rank + 1]) for rank in range(comm.size) if len(pieces[rank])
-        ]
-        asked = comm.alltoall(pieces)
-        self._sent = [(rank, rows - start) for rank, rows in enumerate(asked) if len(rows)]
-
-    def with_ghosts(self, block: Array) -> Array:
-        """`block`, and the rows of the others below it; `block` itself if none is needed."""
-        columns = block.shape[1]
-        whole = block
-        if self._count:
-            whole = np.empty((len(block) + self._count, columns), dtype=block.dtype)
-            whole[: len(block)] = block
-        ghosts = whole[len(block) :]
-        requests = [
-            self._comm.Irecv(ghosts[first:last], source=rank, tag=_ROWS)
-            for rank, first, last in self._received
-        ]
-        buffers = [(rank, block[rows]) for rank, rows in self._sent]
-        requests += [self._comm.Isend(rows, dest=rank, tag=_ROWS) for rank, rows in buffers]
-        MPI.Request.Waitall(requests)
-        return whole
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")

@@ -13,9 +13,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Index
 from solver.linear import symbolic
-
-Index = NDArray[np.int64]
 
 LEAF_NODES = 48
 """Number of nodes that are eliminated together instead of cut."""
@@ -90,12 +89,6 @@ class Fronts:
                 children[parent].append(front)
         return children
 
-    def solve_flops(self) -> int:
-        """Floating-point operations of a solve with one right-hand side."""
-        own = 3 * np.diff(self.first)
-        outside = 3 * np.diff(self.offset)
-        return int((2 * own**2 + 4 * own * outside).sum())
-
 
 def dissect(
     lattice: Index, indptr: Index, indices: Index, steps: int = 1, leaf_nodes: int = LEAF_NODES
@@ -122,12 +115,7 @@ def dissect(
 
 
 def _cut(
-    lattice: Index,
-    nodes: Index,
-    steps: int,
-    leaf_nodes: int,
-    owns: list[Index],
-    parent: list[int],
+    lattice: Index, nodes: Index, steps: int, leaf_nodes: int, owns: list[Index], parent: list[int]
 ) -> int:
     """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
     axis, value = _best_plane(lattice, nodes, steps) if len(nodes) > leaf_nodes else (-1, 0)

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import LocalConvergenceError
 from carillon.numerics.simd import compiler
 from carillon.processes.threads import in_parallel, split
 from solver.linear import plan as plans
 from solver.linear.plan import PANEL, STRIP, Part, Plan, packed_size
-
-Array = NDArray[np.float64]
 
 compiled = compiler(Path(__file__), Path(plans.__file__))
 
@@ -32,22 +30,15 @@ def eliminate_fronts(
 ) -> int:
     """Eliminate all rows of K - shift M.
 
+    Returns how many eigenvalues of the pivots are negative. Raises LocalConvergenceError if the
+    shift is an eigenvalue to rounding.
+
     Parameters
     ----------
     plan, stiffness, mass, shift, threads
         See `solver.linear.multifrontal.Factor`.
     kept
         What a solve needs goes there: pivots with what couples panels, and W in strips.
-
-    Returns
-    -------
-    int
-        Number of negative eigenvalues of the pivots.
-
-    Raises
-    ------
-    LocalConvergenceError
-        If the shift is an eigenvalue to rounding.
     """
     updates: dict[int, Array] = {}
     own_rows, outside = plan.own_rows, plan.outside_rows
@@ -92,6 +83,8 @@ def eliminate_fronts(
 def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], int]:
     """Eliminate the own rows of a front, a panel of them at a time.
 
+    Returns the inverses of the diagonal blocks, and how many of their eigenvalues are negative.
+
     Parameters
     ----------
     own
@@ -100,11 +93,6 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
     pivots
         What becomes of each panel's own columns: the inverse of its diagonal block, and the product
         with it of what couples the panel to the panels after.
-
-    Returns
-    -------
-    tuple[list[Array], int]
-        These inverses, and the number of negative eigenvalues of the diagonal blocks.
     """
     n = len(own)
     scaled = np.empty((n, n))
@@ -146,6 +134,9 @@ def _inverse(block: Array) -> tuple[Array, int]:
 def _update(own: Array, inverses: list[Array], coupling: Array | None, threads: int) -> Array:
     """What the elimination of the own rows takes off the rows beyond, packed.
 
+    Returns the upper triangle of a symmetric matrix: strips of rows, each a rectangle that begins
+    at its first diagonal entry, what is left of the diagonal being anything.
+
     Parameters
     ----------
     own, inverses
@@ -153,12 +144,6 @@ def _update(own: Array, inverses: list[Array], coupling: Array | None, threads: 
     coupling
         The inverses times the own rows' columns beyond become this, a strip of columns after the
         other.
-
-    Returns
-    -------
-    Array
-        The upper triangle of a symmetric matrix: strips of rows, each a rectangle that begins at
-        its first diagonal entry, what is left of the diagonal being anything.
     """
     n = len(own)
     beyond = own[:, n:]
@@ -233,7 +218,6 @@ def _add_beyond(total, total_size, count, places, update):  # type: ignore[no-un
 
 @compiled
 def _mirror(matrix):  # type: ignore[no-untyped-def]
-    """The upper triangle becomes the lower one too."""
     for row in range(len(matrix)):
         for column in range(row):
             matrix[row, column] = matrix[column, row]

@@ -1,29 +1,36 @@
-"""Sparse Cholesky and LDL^T factorisations by what this PETSc offers."""
+"""Sparse Cholesky, LDL^T and incomplete Cholesky factorisations by what this PETSc offers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
+
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError, UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
+from solver.assembly.system import System
+from solver.linear.petsc_options import INNER_PREFIX
 
 ROOM = (50, 200, 800)
 """Percentages by which the memory exceeds MUMPS's guess, tried one after the other. Pivots that
 have to wait are in no guess, and on several ranks their number differs between runs."""
-_ROOM = 14
-"""MUMPS's control of that percentage."""
 _TOO_LITTLE_ROOM = (-8, -9, -17, -20)
 """Values of MUMPS's INFOG(1) if the memory was too little."""
+COLUMNS = 128
+"""Number of right-hand sides that MUMPS carries through its factor together."""
+_ROOM, _BLOCKING, _ROOT_ON_ONE = 14, 27, 13
+"""MUMPS's controls of these, and of whether the root of the tree lies on one rank."""
+FILL_LEVELS = 0
+"""Levels of fill of the factor; 0 keeps the pattern of the matrix."""
 
 
 @on_all_ranks()
 def factor_package(ranks: int) -> str:
     """PETSc's name of the sparse Cholesky to use: MUMPS, or PETSc's own on one rank without it.
 
-    Raises
-    ------
-    UserError
-        On several ranks without MUMPS.
+    Raises UserError on several ranks without MUMPS.
     """
     if PETSc.Sys.hasExternalPackage("mumps"):
         return "mumps"
@@ -49,6 +56,9 @@ def factorised(
 ) -> PETSc.PC:
     """LDL^T of a symmetric matrix, to be destroyed by the caller; collective.
 
+    Raises UserError on several ranks without MUMPS, and ConvergenceError if the factorisation
+    fails.
+
     Parameters
     ----------
     matrix
@@ -57,13 +67,6 @@ def factorised(
         MUMPS's ICNTL by their numbers.
     prefix
         Of options that may overrule this.
-
-    Raises
-    ------
-    UserError
-        On several ranks without MUMPS.
-    ConvergenceError
-        If the factorisation fails.
     """
     package = factor_package(matrix.comm.size)
     status = 0
@@ -95,8 +98,93 @@ def factorised(
     raise _failure(matrix, f"MUMPS: INFOG(1) = {status}")
 
 
+def solve_dense(factor: PETSc.Mat, block: Array, unknowns: int, comm: Any) -> Array:
+    """Solutions (local, k), column-major as the right-hand sides are; collective."""
+    solutions = np.empty_like(block)
+    views = []
+    for each in (block, solutions):
+        size = ((len(each), unknowns), (None, each.shape[1]))
+        views.append(PETSc.Mat().createDense(size, array=each, comm=comm))
+        views[-1].assemble()
+    factor.matSolve(*views)
+    for view in views:
+        view.destroy()
+    return solutions
+
+
 def _failure(matrix: PETSc.Mat, cause: str) -> ConvergenceError:
     return ConvergenceError(
         f"the sparse factorisation of {matrix.getSize()[0]:,} unknowns failed ({cause}); with too "
         "little memory use more ranks on more machines, or --linear-solver amg-cg"
     )
+
+
+class MumpsInverse:
+    """Action of (K - shift M)^-1 by sparse LDL^T, on any number of ranks; see `Inverse`."""
+
+    exact = True
+
+    def __init__(self, system: System, shift: float) -> None:
+        self.shift = shift
+        self._system = system
+        self._matrix = system.K.copy()
+        self._matrix.axpy(-shift, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        # A negative shift makes the matrix definite, which spares the pivoting.
+        option = PETSc.Mat.Option.SPD if shift < 0.0 else PETSc.Mat.Option.SYMMETRIC
+        self._matrix.setOption(option, True)
+        # Pivots of a root that several ranks share are not counted.
+        controls = {_BLOCKING: COLUMNS, _ROOT_ON_ONE: 1} if shift > 0.0 else {_BLOCKING: COLUMNS}
+        self._pc = factorised(self._matrix, controls, INNER_PREFIX)
+        self._factor = self._pc.getFactorMatrix()
+        self.negative = self._factor.getMumpsInfog(12) if shift > 0.0 else 0
+
+    def solve(self, block: Array) -> Array:
+        """Solutions for a row-major block of right-hand sides (local unknowns, k)."""
+        system, rhs = self._system, np.asfortranarray(block)
+        return np.ascontiguousarray(solve_dense(self._factor, rhs, system.n_dofs, system.comm))
+
+    def destroy(self) -> None:
+        """Free the factorisation."""
+        self._pc.destroy()
+        self._matrix.destroy()
+
+
+class IncompleteCholesky:
+    """PETSc's incomplete Cholesky factor of the rows and columns that this rank owns.
+
+    On one rank that is the preconditioner of the paper's section 7.2.1, on several the block Jacobi
+    of it: couplings between ranks are left out.  The matrix is scaled to a unit diagonal first.
+    Where a pivot is not positive, PETSc repeats the factorisation with a larger and larger multiple
+    of the identity added, which then stands in the same proportion to soft elements and stiff ones.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        # The diagonal block is not ours to change on several ranks.
+        self._block = matrix.getDiagonalBlock().copy()
+        diagonal = self._block.getDiagonal()
+        diagonal.sqrtabs()
+        diagonal.reciprocal()
+        self._block.diagonalScale(diagonal, diagonal)
+        self._scale = diagonal.getArray().copy()[:, None]
+        diagonal.destroy()
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setOperators(self._block)
+        self._pc.setType(PETSc.PC.Type.ICC)
+        self._pc.setFactorLevels(FILL_LEVELS)
+        self._pc.setFactorOrdering(PETSc.Mat.OrderingType.NATURAL)
+        self._pc.setFactorShift(PETSc.Mat.FactorShiftType.POSITIVE_DEFINITE)
+        self._pc.setUp()
+        self._factor = self._pc.getFactorMatrix()
+
+    def apply(self, block: Array) -> Array:
+        """Solution (local, k) with the factor for a block of right-hand sides (local, k)."""
+        right = np.multiply(self._scale, block, order="F")
+        solution = right
+        if right.size:
+            solution = solve_dense(self._factor, right, len(right), PETSc.COMM_SELF)
+        return np.multiply(self._scale, solution, order="C")
+
+    def destroy(self) -> None:
+        """Free the factor."""
+        self._pc.destroy()
+        self._block.destroy()

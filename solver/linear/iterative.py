@@ -8,20 +8,19 @@ models that are too large to factor: its iterations hardly grow with the mesh.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numba
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.processes.petsc import PETSc
 from carillon.processes.threads import in_parallel, split
-from solver.linear.incomplete import IncompleteCholesky
+from solver.assembly.system import System
+from solver.linear.factorisation import IncompleteCholesky
 from solver.linear.multigrid import Multigrid
-
-Array = NDArray[np.float64]
 
 METHODS = ("icc-pcg", "amg-cg")
 TOLERANCE = 1e-1
@@ -41,51 +40,18 @@ ROUNDS = 3
 """Number of restarts from the true residual, from which rounding parts the recursive one."""
 
 
-class Operators(Protocol):
-    """What the solvers ask of the eigenvalue problem K u = lambda M u."""
-
-    @property
-    def K(self) -> Any:  # noqa: N802
-        """Stiffness as a PETSc matrix (AIJ, block size 3)."""
-
-    @property
-    def M(self) -> Any:  # noqa: N802
-        """Mass as a PETSc matrix."""
-
-    @property
-    def rigid(self) -> Array:
-        """Mass-orthonormal rigid motions (local, 6)."""
-
-    @property
-    def comm(self) -> MPI.Comm:
-        """Ranks that share the rows."""
-
-    def times_stiffness(self, block: Array) -> Array:
-        """K X."""
-
-    def times_mass(self, block: Array) -> Array:
-        """M X."""
-
-    def inner(self, left: Array, right: Array) -> Array:
-        """left^T right, equal on all ranks."""
-
-    def column_products(self, left: Array, right: Array) -> Array:
-        """Inner product of each column with the same column, equal on all ranks."""
-
-
 class IterativeInverse:
-    """(K - shift M)^-1 by preconditioned conjugate gradients, for shift < 0.
+    """(K - shift M)^-1 by preconditioned conjugate gradients, for shift < 0; see `Inverse`.
+
+    Parameters
+    ----------
+    tolerance
+        Largest accepted |b - (K - shift M) x| / |b| of a column, Euclidean norms.
 
     Attributes
     ----------
-    shift
-        Negative [rad^2/s^2].
-    exact
-        False: solutions hold to `tolerance` only.
     iterations
         Iterations so far, summed over the right-hand sides.
-    right_hand_sides
-        Right-hand sides solved so far.
     """
 
     exact = False
@@ -93,7 +59,7 @@ class IterativeInverse:
 
     def __init__(
         self,
-        operators: Operators,
+        system: System,
         shift: float,
         method: str = "amg-cg",
         tolerance: float = TOLERANCE,
@@ -101,44 +67,31 @@ class IterativeInverse:
         columns: int = COLUMNS,
         threads: int = 1,
     ) -> None:
-        """
-        Parameters
-        ----------
-        method
-            `icc-pcg` or `amg-cg`.
-        tolerance
-            Largest accepted |b - (K - shift M) x| / |b| of a column, Euclidean norms.
-        max_iterations, columns
-            See `MAX_ITERATIONS` and `COLUMNS`.
-        threads
-            Threads of this rank.
-        """
         if shift >= 0.0:
             raise ValueError("a free body has a singular stiffness; the shift must be negative")
         if method not in METHODS:
             raise ValueError(f"'{method}' is none of the linear solvers {', '.join(METHODS)}")
         self.shift = shift
         self.iterations = 0
-        self.right_hand_sides = 0
-        self._operators = operators
+        self._system = system
         self._method = method
         self._tolerance = tolerance
         self._max_iterations = max_iterations
         self._columns = columns
-        self._rigid = np.ascontiguousarray(operators.rigid)
-        self._mass_rigid = operators.times_mass(self._rigid)
+        self._rigid = np.ascontiguousarray(system.rigid)
+        self._mass_rigid = system.times_mass(self._rigid)
         self._threads = threads
         self._preconditioner = self._prepare()
 
     def _prepare(self) -> IncompleteCholesky | Multigrid:
-        operators = self._operators
-        matrix = operators.K.copy()
-        matrix.axpy(-self.shift, operators.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        system = self._system
+        matrix = system.K.copy()
+        matrix.axpy(-self.shift, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         try:
             if self._method == "icc-pcg":
                 return IncompleteCholesky(matrix)
-            return Multigrid(matrix, self._rigid, operators.comm, threads=self._threads)
+            return Multigrid(matrix, self._rigid, system.comm, threads=self._threads)
         finally:
             matrix.destroy()
 
@@ -149,21 +102,17 @@ class IterativeInverse:
     def solve(self, block: Array) -> Array:
         """Solution (local, k) for a row-major block of right-hand sides (local, k); collective.
 
-        Raises
-        ------
-        ConvergenceError
-            On every rank, if a column misses the tolerance.
+        Raises ConvergenceError on every rank, if a column misses the tolerance.
         """
         solution = np.empty(block.shape)
         for first in range(0, block.shape[1], self._columns):
             chosen = slice(first, first + self._columns)
             solution[:, chosen] = self._solve_columns(np.ascontiguousarray(block[:, chosen]))
-        self.right_hand_sides += block.shape[1]
         return solution
 
     def _solve_columns(self, rhs: Array) -> Array:
         """Rigid part in closed form, K R = 0, and the rest by conjugate gradients."""
-        share = self._operators.inner(self._rigid, rhs)
+        share = self._system.inner(self._rigid, rhs)
         solution = self._rigid @ (share / -self.shift)
         target = self._tolerance * self._norms(rhs)
         before = self.iterations
@@ -180,7 +129,7 @@ class IterativeInverse:
 
     def _iterate(self, residual: Array, target: Array) -> Array:
         """Conjugate gradients from zero (Hestenes & Stiefel 1952) until |residual| <= target."""
-        products = self._operators.column_products
+        products = self._system.column_products
         residual = residual.copy()
         finished = np.empty_like(residual)
         solution = np.zeros_like(residual)
@@ -211,10 +160,9 @@ class IterativeInverse:
         raise self._failure(norms, target[active], step)
 
     def _apply(self, block: Array) -> Array:
-        """(K - shift M) X."""
-        image = self._operators.times_mass(block)
+        image = self._system.times_mass(block)
         image *= -self.shift
-        image += self._operators.times_stiffness(block)
+        image += self._system.times_stiffness(block)
         return image
 
     def _turn(self, direction: Array, residual: Array, before: Array) -> Array:
@@ -224,8 +172,8 @@ class IterativeInverse:
         search then never meets the smallest eigenvalues, those of the rigid motions.
         """
         preconditioned = self._preconditioner.apply(residual)
-        energy = self._operators.column_products(residual, preconditioned)
-        share = self._operators.inner(self._mass_rigid, preconditioned)
+        energy = self._system.column_products(residual, preconditioned)
+        share = self._system.inner(self._mass_rigid, preconditioned)
         ratio = energy / before
         self._by_rows(_conjugate, (ratio, share), direction, preconditioned, self._rigid)
         return energy
@@ -240,7 +188,7 @@ class IterativeInverse:
         in_parallel(work, split(rows, self._threads, max(rows, 1)), self._threads)
 
     def _norms(self, block: Array) -> Array:
-        return np.sqrt(self._operators.column_products(block, block))
+        return np.sqrt(self._system.column_products(block, block))
 
     def _failure(self, norms: Array, target: Array, steps: int) -> ConvergenceError:
         worst = self._tolerance * float(np.max(norms / np.maximum(target, TINY)))
@@ -258,8 +206,6 @@ class IterativeInverse:
 
 
 class _Progress:
-    """Watches whether the smallest residual of every column keeps falling."""
-
     def __init__(self, norms: Array) -> None:
         self._best = norms.copy()
         self._since = np.zeros(len(norms), dtype=np.int64)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.processes.threads import blas_threads
 from solver.distribution.collective import compute_on_root, gather_rows
 from solver.linear.multifrontal import Factor, count_below
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
     from solver.linear import Inverse
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")
 
@@ -34,14 +34,7 @@ of that waited so far, and the least [s]."""
 
 
 class Leader:
-    """Rank 0's part of the work for the ranks of its machine; collective.
-
-    Parameters
-    ----------
-    layout
-        Of the mesh.
-
-    """
+    """Rank 0's part of the work for the ranks of its machine; collective."""
 
     def __init__(self, layout: Layout) -> None:
         self.comm = comm = layout.comm
@@ -57,12 +50,8 @@ class Leader:
             steps = local_mesh.cells.elements.steps
             return Plan(lattice, indptr, columns.ravel(), steps=steps)
 
-        self._plan = self.alone(planned)
-
-    @property
-    def whole_plan(self) -> Plan:
-        """Elimination of all rows, on rank 0 alone."""
-        return cast(Plan, self._plan)
+        # Of all rows, on rank 0 alone.
+        self.whole_plan = cast(Plan, self.alone(planned))
 
     def threads(self, system: System) -> int:
         """Threads that rank 0 has while it works for all."""
@@ -154,7 +143,6 @@ class _LedInverse:
 
 @contextmanager
 def _on_cores(cores: set[int]) -> Iterator[None]:
-    """Let this thread, and those that it starts, use these cores where the system allows it."""
     before = os.sched_getaffinity(0)
     with suppress(OSError):
         os.sched_setaffinity(0, cores)

@@ -11,24 +11,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import LocalConvergenceError
 from carillon.numerics.small_gemm import block, lanes_of
 from carillon.processes.memory import available_memory
 from carillon.processes.threads import in_parallel, in_tree, split
 from solver.linear.elimination import eliminate_fronts
 from solver.linear.plan import Part, Plan
-from solver.linear.sweeps import (
-    add_nodes,
-    copy_nodes,
-    eliminate,
-    put_rows,
-    substitute,
-    take_rows,
-)
-
-Array = NDArray[np.float64]
+from solver.linear.sweeps import add_nodes, copy_nodes, eliminate, put_rows, substitute, take_rows
 
 COLUMNS = 64
 """Number of right-hand sides that go through the fronts together."""
@@ -40,6 +31,9 @@ fronts."""
 class Factor:
     """Factorisation of K - shift M for one material.
 
+    Of its eigenvalues `negative` are below the shift, by Sylvester's law of inertia. Raises
+    LocalConvergenceError if it would not fit in memory.
+
     Parameters
     ----------
     plan
@@ -48,18 +42,6 @@ class Factor:
         (e, 3, 3) and (e,) blocks of K and M along the graph.
     shift
         Any value that is not an eigenvalue.
-    threads
-        Threads that share the work.
-
-    Attributes
-    ----------
-    negative
-        Number of eigenvalues below the shift, by Sylvester's law of inertia.
-
-    Raises
-    ------
-    LocalConvergenceError
-        If it would not fit in memory.
     """
 
     exact = True

@@ -44,8 +44,6 @@ class Multigrid:
         Symmetric positive definite PETSc matrix (AIJ, block size 3).
     near_null
         (local, 6) rigid motions: what smoothing cannot reduce, and coarse levels must represent.
-    comm
-        Its ranks.
     dtype
         Numbers that the cycle computes with.  Single precision halves the traffic of memory, and is
         enough for a preconditioner.
@@ -147,8 +145,6 @@ class _Level:
 
 
 class _Inverse:
-    """Inverse of the coarsest matrix; every rank holds its own rows."""
-
     def __init__(self, matrix: Any, comm: MPI.Comm, dtype: Any) -> None:
         self._comm = comm
         size = matrix.getSize()[0]

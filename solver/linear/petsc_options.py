@@ -17,7 +17,6 @@ OUT_OF_MEMORY, OTHER_LIBRARY = 55, 76
 """PETSc's codes of errors that one rank may have alone; all ranks dislike options together."""
 _ASKED_LATE = ("view", "monitor", "reason")
 """Parts of names that PETSc asks for when it has solved."""
-
 GENERAL = ("slepc", "arpack")
 """Methods that are SLEPc's, which have an eigensolver to be configured."""
 
@@ -28,11 +27,8 @@ _inserted: list[str] = []
 def insert_options(text: str | None, method: str = "slepc") -> None:
     """Put options like `-carillon_eps_ncv 400` into PETSc's database; earlier ones leave it.
 
-    Raises
-    ------
-    UserError
-        If an option lacks the prefix, and would be ignored by the method or mean something for the
-        whole program.
+    Raises UserError if an option lacks the prefix, and would be ignored by the method or mean
+    something for the whole program.
     """
     for name in _inserted:
         PETSc.Options().delValue(name)
@@ -57,10 +53,7 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
 def require_known_options() -> None:
     """Check, once an eigensolver is set up and before it solves, that it knows all options.
 
-    Raises
-    ------
-    UserError
-        If it did not ask for one of those inserted, which is then misspelt.
+    Raises UserError if it did not ask for one of those inserted, which is then misspelt.
     """
     strange = [name for name in unused_options() if not any(part in name for part in _ASKED_LATE)]
     if strange:
@@ -92,7 +85,6 @@ def unused_options() -> list[str]:
 
 
 def _library() -> ctypes.CDLL | None:
-    """The library of PETSc that this process has loaded."""
     with suppress(OSError):
         for line in Path("/proc/self/maps").read_text().splitlines():
             path = line.split(maxsplit=5)[-1]

@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Index
 from carillon.processes.threads import split
 from solver.linear.dissection import Fronts, dissect
-
-Index = NDArray[np.int64]
 
 PANEL = 120
 """Number of rows of a front that are eliminated together."""
@@ -124,8 +122,6 @@ class Plan:
         (n, 3) integer coordinates of the nodes.
     indptr, indices
         Node graph in compressed rows; the data of `Factor` follow it.
-    options
-        Others of `solver.linear.dissection.dissect`.
 
     Attributes
     ----------

@@ -54,7 +54,6 @@ def add_nodes(source, place, nodes, lanes, target):  # type: ignore[no-untyped-d
 
 @compiled
 def _largest(first, near_offset):  # type: ignore[no-untyped-def]
-    """Own rows of the tallest front, and rows that the widest is coupled to."""
     tallest = longest = 0
     for number in range(len(first) - 1):
         tallest = max(tallest, 3 * (first[number + 1] - first[number]))

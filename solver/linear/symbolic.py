@@ -12,6 +12,8 @@ _ROOM = 1 << 16
 def boundaries(indptr, indices, order, position, first, parent):  # type: ignore[no-untyped-def]
     """Positions that each front is coupled to, after its own, in compressed form.
 
+    Returns offsets (fronts + 1,) and positions, ascending in each front.
+
     Parameters
     ----------
     indptr, indices
@@ -20,11 +22,6 @@ def boundaries(indptr, indices, order, position, first, parent):  # type: ignore
         Nodes in the order of elimination, and the place of each in it.
     first, parent
         See `solver.linear.dissection.Fronts`.
-
-    Returns
-    -------
-    tuple
-        Offsets (fronts + 1,) and positions, ascending in each front.
     """
     fronts = len(parent)
     offset = np.zeros(fronts + 1, dtype=np.int64)
@@ -72,12 +69,8 @@ def entries(indptr, indices, order, position, first, offset, boundary):  # type:
     """Block entries of each front in compressed form.
 
     Those with a row of the front and a column that is not eliminated before it.  `offset` and
-    `boundary` are those of `boundaries`.
-
-    Returns
-    -------
-    tuple
-        Offsets (fronts + 1,), and (e, 3) int32: row and column in the front, number in the data.
+    `boundary` are those of `boundaries`. Returns offsets (fronts + 1,), and (e, 3) int32: row and
+    column in the front, number in the data.
     """
     fronts = len(first) - 1
     start = np.zeros(fronts + 1, dtype=np.int64)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.assembly.system import System
 from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX, require_known_options
-
-Array = NDArray[np.float64]
 
 TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
 MAX_ITERATIONS = 500
@@ -44,7 +41,10 @@ def smallest_eigenpairs(
 
     Krylov-Schur deflates the known vectors.  ARPACK cannot, since SLEPc lets it keep its basis
     where the deflated vectors are: it finds as many pairs more, of which those in the span of the
-    known ones are dropped.
+    known ones are dropped. Returns values (k,) ascending, vectors (local, k), outer iterations; k
+    may be smaller than `count`, which is for the caller to judge.  The vectors are M-orthonormal
+    but for copies of a multiple eigenvalue, which are so to the tolerance. Raises UserError if this
+    SLEPc lacks the method.
 
     Parameters
     ----------
@@ -52,96 +52,68 @@ def smallest_eigenpairs(
         K positive semidefinite, M positive definite.
     known
         (local, k) M-orthonormal eigenvectors.
-    count
-        Number of pairs wanted.
     shift
         Positive; K + shift M is factorised.
     start
         (local,) vector that the Krylov space is made from.
-    tolerance
-        Relative residual.
     method
         `slepc` (Krylov-Schur) or `arpack`.
     configurable
         Whether PETSc's options database may overrule this set-up.
-
-    Returns
-    -------
-    tuple[Array, Array, int]
-        Values (k,) ascending, vectors (local, k), outer iterations; k may be smaller than `count`,
-        which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
-        multiple eigenvalue, which are so to the tolerance.
-
-    Raises
-    ------
-    UserError
-        If this SLEPc lacks the method.
     """
     *others, last = definite_packages(system.comm.size)
-    search = partial(_search, system, known, count, shift, start, tolerance, method, configurable)
+
+    def search(package: str) -> tuple[Array, Array, int]:
+        solver = SLEPc.EPS().create(system.comm)
+        vectors = [_petsc_vector(start, system.comm)]
+        try:
+            try:
+                solver.setType(TYPES[method])
+            except PETSc.Error:
+                with on_all_ranks():
+                    raise UserError(
+                        f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
+                    ) from None
+            solver.setOperators(system.K, system.M)
+            solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+            solver.setTolerances(tolerance, MAX_ITERATIONS)
+            solver.setInitialSpace(vectors[0])
+            asked = count
+            if method == "arpack":
+                asked = min(count + known.shape[1], system.n_dofs - ARPACK_MARGIN)
+                solver.setDimensions(asked)
+            else:
+                vectors += [_petsc_vector(column, system.comm) for column in known.T]
+                solver.setDeflationSpace(vectors[1:])
+                subspace = max(round(SUBSPACE * asked), asked + FEWEST_MORE)
+                solver.setDimensions(asked, min(subspace, system.n_dofs))
+            solver.setTarget(-shift)
+            solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+            transform = solver.getST()
+            transform.setType(SLEPc.ST.Type.SINVERT)
+            transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            linear = transform.getKSP()
+            linear.setType(PETSc.KSP.Type.PREONLY)
+            preconditioner = linear.getPC()
+            preconditioner.setType(PETSc.PC.Type.CHOLESKY)
+            preconditioner.setFactorSolverType(package)
+            if configurable:
+                solver.setOptionsPrefix(OPTIONS_PREFIX)
+                solver.setFromOptions()
+                solver.setUp()
+                require_known_options()
+            solver.solve()
+            values, modes = _collect(system, solver, min(solver.getConverged(), asked))
+            values, modes = _outside(system, known, values, modes)
+            return values[:count], modes[:, :count], int(solver.getIterationNumber())
+        finally:
+            for used in (solver, *vectors):
+                used.destroy()
+
     for package in others:
         with suppress(PETSc.Error):
             return search(package)
     return search(last)
-
-
-def _search(
-    system: System,
-    known: Array,
-    count: int,
-    shift: float,
-    start: Array,
-    tolerance: float,
-    method: str,
-    configurable: bool,
-    package: str,
-) -> tuple[Array, Array, int]:
-    """`smallest_eigenpairs` by one package's factorisation."""
-    solver = SLEPc.EPS().create(system.comm)
-    vectors = [_petsc_vector(start, system.comm)]
-    try:
-        try:
-            solver.setType(TYPES[method])
-        except PETSc.Error:
-            with on_all_ranks():
-                raise UserError(
-                    f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
-                ) from None
-        solver.setOperators(system.K, system.M)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setTolerances(tolerance, MAX_ITERATIONS)
-        solver.setInitialSpace(vectors[0])
-        asked = count
-        if method == "arpack":
-            asked = min(count + known.shape[1], system.n_dofs - ARPACK_MARGIN)
-            solver.setDimensions(asked)
-        else:
-            vectors += [_petsc_vector(column, system.comm) for column in known.T]
-            solver.setDeflationSpace(vectors[1:])
-            subspace = max(round(SUBSPACE * asked), asked + FEWEST_MORE)
-            solver.setDimensions(asked, min(subspace, system.n_dofs))
-        solver.setTarget(-shift)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        linear = transform.getKSP()
-        linear.setType(PETSc.KSP.Type.PREONLY)
-        preconditioner = linear.getPC()
-        preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-        preconditioner.setFactorSolverType(package)
-        if configurable:
-            solver.setOptionsPrefix(OPTIONS_PREFIX)
-            solver.setFromOptions()
-            solver.setUp()
-            require_known_options()
-        solver.solve()
-        values, modes = _collect(system, solver, min(solver.getConverged(), asked))
-        values, modes = _outside(system, known, values, modes)
-        return values[:count], modes[:, :count], int(solver.getIterationNumber())
-    finally:
-        for used in (solver, *vectors):
-            used.destroy()
 
 
 def _petsc_vector(entries: Array, comm: Any) -> Any:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
 from carillon.processes.petsc import PETSc
@@ -16,8 +16,6 @@ from solver.linear.factorisation import factorised
 from solver.reference.eigensolver import smallest_eigenpairs
 from solver.subspace.rayleigh_ritz import is_orthonormal, rayleigh_ritz, rigid_pairs, safe_shift
 from solver.subspace.start import start_vector
-
-Array = NDArray[np.float64]
 
 RESIDUAL_TOLERANCE = 1e-10
 """Default of the relative residual of ground truth."""
@@ -80,23 +78,14 @@ def solve_truth(
     """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
 
     The six rigid motions are known and deflated.  Of other multiple eigenvalues copies may be
-    missed; see `complete`.
+    missed; see `complete`. Raises ConvergenceError if too few pairs converge.
 
     Parameters
     ----------
     method
         `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode.
-    tolerance
-        Relative residual tolerance of the eigensolver.
     spare
         Modes beyond, among which `count_beyond` looks for a gap.
-    seed
-        Of the vector that the eigensolver starts from.
-
-    Raises
-    ------
-    ConvergenceError
-        If too few pairs converge.
     """
     truth = Truth(*rigid_pairs(system), modes, 0)
     requested = min(modes + spare, system.n_dofs) - RIGID_MODES
@@ -126,7 +115,9 @@ def count_beyond(
     """
     value, computed = _gap(truth.values, truth.modes, system.n_dofs)
     counted = None if count is None else count(system, value)
-    return Inertia(value, count_below(system, value) if counted is None else counted, computed)
+    if counted is None:
+        counted = count_negative(system.K, system.M, value)
+    return Inertia(value, counted, computed)
 
 
 def complete(
@@ -140,25 +131,10 @@ def complete(
 
     Every search starts from another vector and deflates what is there, so that of each multiple
     eigenvalue it finds one copy at least.  Without a count the first search that finds nothing
-    below the last wanted eigenvalue ends it: evidence, but no proof.
-
-    Parameters
-    ----------
-    inertia
-        What was counted; None where that cannot be done.
-    tolerance, seed
-        See `solve_truth`.
-
-    Returns
-    -------
-    tuple[Truth, Inertia | None]
-        Eigenpairs, of which the first `modes` are complete, and the count with what is computed
-        now.
-
-    Raises
-    ------
-    ConvergenceError
-        If the count contradicts the computed number in the end.
+    below the last wanted eigenvalue ends it: evidence, but no proof. The `inertia` is what was
+    counted; None where that cannot be done. Returns eigenpairs, of which the first `modes` are
+    complete, and the count with what is computed now. Raises ConvergenceError if the count
+    contradicts the computed number in the end.
     """
     if inertia is None:
         last = float(truth.values[truth.modes - 1])
@@ -244,11 +220,6 @@ def _gap(values: Array, modes: int, n_dofs: int) -> tuple[float, int]:
     gaps = np.divide(np.diff(values[modes - 1 :]), above, np.zeros(len(above)), where=above > 0.0)
     widest = int(np.argmax(gaps)) + modes
     return float(0.5 * (values[widest - 1] + values[widest])), widest
-
-
-def count_below(system: System, value: float) -> int:
-    """Number of eigenvalues of an assembled system below `value` [rad^2/s^2]."""
-    return count_negative(system.K, system.M, value)
 
 
 def count_negative(K: PETSc.Mat, M: PETSc.Mat, value: float) -> int:

@@ -17,22 +17,17 @@ from functools import partial
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
-from solver.refinement.errors import LAST, ExpectedErrors
+from solver.refinement.errors import LAST, ExpectedErrors, RefinementStep
 from solver.refinement.estimate import ErrorEstimate, estimate_errors
-from solver.refinement.fine_start import FineStart
-from solver.refinement.inverse_iteration import InverseIteration
+from solver.refinement.inverse_iteration import FineStart, InverseIteration
 from solver.refinement.model_solver import SolveModel
-from solver.refinement.refine import RefinementStep
 from solver.refinement.refined_model import RefinedModel
 from solver.refinement.weighing import Weighing
-
-Array = NDArray[np.float64]
 
 UNTOLD = "how far frequencies are off cannot be told"
 """Reason for the fine solid where an estimate fails."""
@@ -46,8 +41,6 @@ class CoarseOrFine:
     ----------
     model
         The model that was solved last, on rank 0.
-    modes
-        Modes of that model.
     steps
         Coarse models that were rated; none if the fine solid was taken at once.
     reason
@@ -84,8 +77,6 @@ def solve_coarsened(
         three times as large.
     options
         What `solve` computes and how, which the work is reckoned from.
-    report
-        Called on rank 0 after each estimate.
 
     Examples
     --------

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
+from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
-
-Array = NDArray[np.float64]
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import between
+from solver.coarsening.forest import FOREST
 
 FIRST = RIGID_MODES + 1
 """Number of the first mode whose error is estimated."""
@@ -20,6 +22,12 @@ FROM_FINE, FROM_SOLID = "expected_frequency_error", "solid_frequency_error"
 """Prefixes of the attributes with errors against the fine voxels and against the solid."""
 WORST = 3.0
 """Largest error of a frequency, as a multiple of their allowed root mean square."""
+ALLOWED_ERROR = 0.05
+"""Default of the expected error of frequencies down to which blocks are kept fine."""
+ALLOWED_DISTANCE = 0.01
+"""Default of the expected distance from the solid's frequencies down to which cells are divided."""
+FINE_BLOCKS, DIVIDED_CELLS = "fine_blocks", "divided_cells"
+"""Attributes that count what was refined: blocks that stay fine, and cells that are divided."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,19 @@ class ExpectedErrors:
         }
 
 
+@dataclass(frozen=True)
+class RefinementStep:
+    """A model that was tried.
+
+    It has so many `refined` of `FINE_BLOCKS` or `DIVIDED_CELLS`, which are `counted`.
+    """
+
+    unknowns: int
+    counted: str
+    refined: int
+    errors: ExpectedErrors
+
+
 def in_words(attributes: dict[str, Any], prefix: str) -> str:
     """A sentence's end about errors that a file's attributes tell."""
     first, last = attributes[f"{prefix}_modes"]
@@ -76,3 +97,41 @@ def in_words(attributes: dict[str, Any], prefix: str) -> str:
         f"of frequencies {first} to {last}: {attributes[f'{prefix}_rms']:.1%} rms, worst "
         f"{attributes[f'{prefix}_worst']:+.1%} (mode {attributes[f'{prefix}_worst_mode']})"
     )
+
+
+@parameters
+class RefinementOptions:
+    """Which error a coarse model, or one of finite cells, may have."""
+
+    refine_to: Annotated[float, between(0.0, 10.0)] | None = option(
+        None,
+        "keep blocks fine, or divide finite cells, until the expected error of the frequencies of "
+        "modes 7 to 60 is at most so large: its root mean square, and a third of the worst "
+        f"(default {ALLOWED_ERROR:g} with --coarsen {FOREST}, {ALLOWED_DISTANCE:g} with "
+        "--discretisation finite-cell; 0 refines nothing)",
+        metavar="ERROR",
+    )
+
+    def tolerance(
+        self, coarsen: str, discretisation: str = "voxel", estimated: bool = True
+    ) -> float | None:
+        """The allowed error; None if nothing is to be refined.
+
+        Finite cells are refined by the estimate of their distance from the solid, and left as they
+        are if that is not `estimated` and nothing was given. Raises UserError if it was given and
+        there is nothing to refine.
+        """
+        if discretisation == "finite-cell":
+            if self.refine_to is None:
+                return ALLOWED_DISTANCE if estimated else None
+            return self.refine_to or None
+        if coarsen == "none":
+            if self.refine_to is not None:
+                raise UserError(
+                    "--refine-to keeps blocks of a coarse mesh fine, and there is none: add "
+                    f"--coarsen {FOREST} or --discretisation finite-cell, or leave it out"
+                )
+            return None
+        if self.refine_to is None:
+            return ALLOWED_ERROR if coarsen == FOREST else None
+        return self.refine_to or None

@@ -10,41 +10,38 @@ to keep fine; the sum of the shares is not the error, since u is no coarse mode.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from carillon.arrays import Array
+from carillon.fem.block import degrees_of_freedom
+from carillon.fem.element import uniform_stiffness
 from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.analysis.coarse_start import prolonged
 from solver.analysis.modes import Modes
 from solver.assembly.sparse import sum_blocks
-from solver.refinement.energies import element_energies, fine_energies
 from solver.refinement.errors import LAST, ExpectedErrors
 from solver.refinement.inverse_iteration import InverseIteration, NearModes
-
-Array = NDArray[np.float64]
 
 MODES_USED = LAST + 12
 """Number of modes that are compared, since modes may change places."""
 COLUMNS_USED = LAST - RIGID_MODES + 2
 """Number of elastic modes that are iterated. Random vectors beside them find those that are
 missing."""
+NUMBERS_AT_ONCE = 1 << 22
+"""Number of element displacements that exist at once."""
 
 
 @dataclass(frozen=True)
 class ErrorEstimate:
     """Expected errors of a coarse model's frequencies.
 
-    Attributes
-    ----------
-    errors
-        Expected errors of the frequencies.
-    fine
-        The fine modes that they were compared with, as many as are rated or more.
+    They come from as many `fine` modes as are rated, or more.
     """
 
     errors: ExpectedErrors
@@ -56,8 +53,6 @@ def estimate_errors(solid: InverseIteration, blocks: Blocks | None, modes: Modes
 
     Parameters
     ----------
-    solid
-        The fine solid.
     blocks
         The coarse mesh, plain or mixed, on rank 0; None on the others.
     modes
@@ -134,3 +129,34 @@ def nodal_mass_matrix(model: ElasticModel) -> sp.csr_matrix:
     rows, columns = np.repeat(cells, 8, axis=1).ravel(), np.tile(cells, (1, 8)).ravel()
     blocks = model.nodal_mass().reshape(-1, 1, 1)
     return sum_blocks(rows, columns, blocks, (model.mesh.n_nodes,) * 2)
+
+
+def element_energies(model: ElasticModel, vectors: Array) -> Array:
+    """Twice the strain energy (m, k) [J] of each element in displacements (n_dofs, k) [m]."""
+    dofs = degrees_of_freedom(model.mesh.cells.astype(np.int64))
+    energies = np.empty((len(dofs), vectors.shape[1]))
+    uniform = model.mesh.kinds is None and bool((model.young == model.young[:, :1]).all())
+    kernel = uniform_stiffness(model.poisson)
+    for chosen in _chunks(len(dofs), 24 * (24 + vectors.shape[1])):
+        motions = vectors[dofs[chosen]]
+        if uniform:
+            scale = model.mesh.edge * model.young[chosen, 0]
+            energies[chosen] = (motions * (kernel @ motions)).sum(axis=1) * scale[:, None]
+        else:
+            energies[chosen] = (motions * (model.stiffness(chosen) @ motions)).sum(axis=1)
+    return energies
+
+
+def fine_energies(blocks: Blocks, fine: ElasticModel, vectors: Array) -> Array:
+    """The same of the fine cells that each element of a coarse mesh holds, (mc, k)."""
+    energies = element_energies(fine, vectors)
+    element, position = np.nonzero(blocks.mask)
+    cells = blocks.fine_of_block[element, position]
+    start = np.flatnonzero(np.diff(element, prepend=-1))
+    return np.asarray(np.add.reduceat(energies[cells], start, axis=0))
+
+
+def _chunks(count: int, numbers: int) -> Iterator[slice]:
+    step = max(1, NUMBERS_AT_ONCE // numbers)
+    for first in range(0, count, step):
+        yield slice(first, min(first + step, count))

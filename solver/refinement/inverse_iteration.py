@@ -16,18 +16,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
+from carillon.fem.geometry import Blocks
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.processes.threads import limit_threads
-from solver.analysis.prepared import Prepared
+from solver.analysis.coarse_start import prolonged
+from solver.analysis.modal_solver import ModalSolver, Prepared
+from solver.analysis.options import RANDOM
+from solver.correction.random_start import Approximation
+from solver.correction.shift import is_amid
 from solver.distribution.collective import ranks_of_machine
 from solver.files.initial_modes import scatter_rows
 from solver.linear import Inverse
 from solver.subspace.rayleigh_ritz import SHIFT_FRACTION, rayleigh_ritz
 from solver.subspace.start import start_block
-
-Array = NDArray[np.float64]
 
 AMID = (0.45, 0.65)
 """Shares of the rated eigenvalues between which the shift lies, in their widest gap."""
@@ -62,11 +65,6 @@ class NearModes:
 
 class InverseIteration:
     """A fine solid on all ranks; collective.
-
-    Parameters
-    ----------
-    fine
-        The fine model, on rank 0; None on the others.
 
     Attributes
     ----------
@@ -128,7 +126,6 @@ class InverseIteration:
             self._counted = shift, self.inverse.negative - RIGID_MODES
 
     def _iterated(self, vectors: Array) -> tuple[Array, Array]:
-        """Ritz values and vectors of the iterated vectors (local, m)."""
         assert self.inverse is not None
         system = self.system
         for _ in range(ITERATIONS):
@@ -154,3 +151,42 @@ def _amid(values: Array) -> float:
     gaps = values[first + 1 : last + 1] / values[first:last]
     place = first + int(gaps.argmax())
     return float(np.sqrt(values[place] * values[place + 1]))
+
+
+@dataclass
+class FineStart:
+    """Coarse modes, and the fine solid that they were rated by.
+
+    Attributes
+    ----------
+    values
+        (q,) elastic eigenvalues [rad^2/s^2] of the coarse model.
+    blocks, modes
+        The coarse mesh, and its modes (coarse n_dofs, q), on rank 0.
+    """
+
+    solid: InverseIteration
+    values: Array
+    blocks: Blocks | None
+    modes: Array | None
+
+    @property
+    def prepared(self) -> Prepared:
+        """Partition and analysis of the fine mesh."""
+        return self.solid.prepared
+
+    def begin(self, solver: ModalSolver) -> Approximation | None:
+        """What an analysis of the fine solid may start from; None if it has no use for it."""
+        requested = solver.options.modes - RIGID_MODES
+        if solver.options.method not in RANDOM or solver.options.check_inertia:
+            return None
+        columns = prolonged(self.blocks, self.modes)
+        rows = scatter_rows(columns, len(self.values), solver.local_mesh, solver.comm)
+        inverse = self.solid.inverse
+        if solver.local_mesh is not self.prepared.local_mesh or inverse is None:
+            inverse = None
+        elif not self.prepared.linear.indefinite or not is_amid(inverse, requested):
+            inverse = None
+        else:
+            self.solid.inverse = None  # The analysis frees it.
+        return Approximation(self.values, rows, inverse)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 from mpi4py import MPI
 
@@ -12,44 +11,19 @@ from carillon.fem.model import Solid
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions
-from solver.refinement.fine_start import FineStart
+from solver.refinement.inverse_iteration import FineStart
 
 ESTIMATE_TOLERANCE = 1e-4
 """Relative error of the eigenvalues with which those of voxels are compared."""
 
-
-class SolveModel(Protocol):
-    """Finds the modes of one model after another."""
-
-    def __call__(
-        self, model: Solid | None, modes: int | None = None, start: FineStart | None = None
-    ) -> Modes:
-        """Modes of a model; collective.
-
-        Parameters
-        ----------
-        model
-            The model on rank 0, None on the others.
-        modes
-            Number of modes if they serve an estimate of errors alone.
-        start
-            What a coarse model leaves for the analysis of the fine solid.
-        """
+SolveModel = Callable[..., Modes]
+"""Finds the modes of one model after another, as `SolveByOptions` does."""
 
 
 class SolveByOptions:
-    """Finds modes as options say, see `SolveModel`.
+    """Finds modes as options say.
 
-    Parameters
-    ----------
-    options
-        What to compute and how.
-    comm
-        Ranks that share the work.
-    verbose
-        Whether to show each phase and its time.
-    begin
-        Gives what the analysis of a model starts from, but for models of an estimate.
+    `begin` gives what the analysis of a model starts from, but for models of an estimate.
     """
 
     def __init__(
@@ -67,7 +41,17 @@ class SolveByOptions:
     def __call__(
         self, model: Solid | None, modes: int | None = None, start: FineStart | None = None
     ) -> Modes:
-        """See `SolveModel`."""
+        """Modes of a model; collective.
+
+        Parameters
+        ----------
+        model
+            The model on rank 0, None on the others.
+        modes
+            Number of modes if they serve an estimate of errors alone.
+        start
+            What a coarse model leaves for the analysis of the fine solid.
+        """
         options = self.options if modes is None else for_estimate(self.options, modes)
         prepared = None if start is None else start.prepared
         solver = ModalSolver(model, options, self._comm, self._verbose, prepared)

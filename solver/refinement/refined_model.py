@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Index
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, blocks_with_coarse
 from carillon.fem.model import Constants, ElasticModel
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
-
-Array = NDArray[np.float64]
 
 REMAINING = 0.4
 """Share of the allowed error at which refinement aims, if shares were errors."""
@@ -21,8 +19,6 @@ class RefinedModel:
 
     Parameters
     ----------
-    fine
-        The fine model, with one modulus a cell.
     coarsening
         Of the blocks that do not stay fine.
     mesh
@@ -84,10 +80,7 @@ class RefinedModel:
     def refine(self, shares: Array, excess: float) -> None:
         """Keep fine the elements with the largest shares (mc,) of an error.
 
-        Parameters
-        ----------
-        excess
-            How many times as large as allowed the error is.
+        `excess` is how many times as large as allowed the error is.
         """
         order = np.argsort(-shares, kind="stable")
         reached = np.cumsum(shares[order])
@@ -100,7 +93,7 @@ class RefinedModel:
         everything = np.ones(self._plain.coarse.n_cells, dtype=bool)
         self.blocks = blocks_from_mesh(self.fine.mesh, everything)
 
-    def _with_fine(self, chosen: NDArray[np.int64]) -> Blocks:
+    def _with_fine(self, chosen: Index) -> Blocks:
         """The blocks with other elements fine beside those that are."""
         now, plain = self.blocks, self._plain
         fine = now.is_fine.copy()

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from solver.response.response import Contacts, Damping, displacements, impulse_responses
-
-Array = NDArray[np.float64]
 
 INSTANTS = 150
 """Largest number of instants at which the bound is taken."""
@@ -25,10 +23,6 @@ def motion_limit(
     errors
         (k,) accepted errors of the eigenvalues [rad^2/s^2], see
         `solver.verification.allowance.accepted_errors`.
-    damping
-        Of the motion.
-    seconds
-        (t,) instants [s].
     unknowns
         Of the model: so many modes there are.
 

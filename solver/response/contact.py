@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile
 from solver.response.points import motion_at
 from solver.response.surface import Surface, surface_of
-
-Array = NDArray[np.float64]
 
 RULING_MODES = 6
 """Number of the lowest elastic modes, which decide where a solid is struck."""
@@ -42,6 +40,8 @@ def choose_contacts(
 ) -> list[Contact]:
     """Three points on the surface: where it is struck, where it is watched, and one far from both.
 
+    Raises UserError if a position is away from the surface.
+
     Parameters
     ----------
     truth
@@ -49,11 +49,6 @@ def choose_contacts(
         normal, and watched where, far from there, it then moves most.
     strike, observed
         Positions (3,) [m] that a person wants instead, see `solver.response.surface.Surface.place`.
-
-    Raises
-    ------
-    UserError
-        If a position is away from the surface.
     """
     surface = surface_of(truth.model)
     motion, eigenvalues = _ruling_modes(truth, surface)

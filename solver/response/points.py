@@ -7,10 +7,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from carillon.arrays import Array, Index
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.model import Solid
-
-Array = NDArray[np.float64]
 
 
 def motion_at(model: Solid, modes: Array, points: Array) -> Array:
@@ -50,7 +49,7 @@ def interpolation(model: Solid, points: Array) -> sp.csr_matrix:
     return matrix
 
 
-def embedding(model: Solid, points: Array) -> tuple[NDArray[np.int64], Array]:
+def embedding(model: Solid, points: Array) -> tuple[Index, Array]:
     """Elements (p,) that `points` (p, 3) [m] lie in, and weights (p, k) of their nodes.
 
     A point outside all elements belongs to a nearest one, with the weights of its nearest point. Of
@@ -73,7 +72,7 @@ def embedding(model: Solid, points: Array) -> tuple[NDArray[np.int64], Array]:
     return cells, model.shape_values(cells, np.clip(local, 0.0, 1.0))
 
 
-def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> NDArray[np.int64]:
+def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> Index:
     """Number (p,) of the place whose cube, of edge `spans`, positions (p, 3) lie in or nearest."""
     nearest = np.zeros(len(position), dtype=np.int64)
     least = np.full(len(position), np.inf)
@@ -88,7 +87,7 @@ def _nearest_place(places: NDArray[np.int32], spans: Array, position: Array) -> 
 
 
 def _from_material(
-    model: Solid, mesh: HexMesh, cells: NDArray[np.int64], spans: Array, position: Array
+    model: Solid, mesh: HexMesh, cells: Index, spans: Array, position: Array
 ) -> Array:
     """Distance (p, c) of positions (p, 3) from the nearest filled octant of cells (p, c)."""
     octants = model.filled[cells]

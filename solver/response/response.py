@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array, Flags
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile
 from solver.response.contact import Contact
 from solver.response.points import motion_at
-
-Array = NDArray[np.float64]
 
 SAMPLE_RATE_HERTZ = 44_100
 """Samples of a sound per second [Hz]."""
@@ -150,7 +148,7 @@ def in_turn(sounds: Array, loudest: Array) -> Array:
     return np.asarray((sounds / np.where(loudest > 0.0, loudest, np.inf)[:, None]).ravel())
 
 
-def is_audible(eigenvalues: Array) -> NDArray[np.bool_]:
+def is_audible(eigenvalues: Array) -> Flags:
     """Which eigenvalues [rad^2/s^2] belong to audible frequencies."""
     hertz = np.sqrt(np.maximum(eigenvalues, 0.0)) / (2.0 * np.pi)
     return np.asarray((hertz >= AUDIBLE_HERTZ[0]) & (hertz <= AUDIBLE_HERTZ[1]))

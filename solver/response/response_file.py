@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.parameters import option, parameters
@@ -29,9 +29,7 @@ from solver.response.response import (
     relative_difference,
     spectral_distance,
 )
-from solver.subspace.spectrum import clusters
-
-Array = NDArray[np.float64]
+from solver.subspace.weyl import clusters
 
 KIND = "response"
 SCHEMA = 2
@@ -56,12 +54,10 @@ class StrikeOptions:
         metavar=("X", "Y", "Z"),
     )
     mass_damping: Annotated[float, between(0.0, 1e12)] = option(
-        Damping.mass_per_second,
-        "coefficient of the mass in Rayleigh damping [1/s]",
+        Damping.mass_per_second, "coefficient of the mass in Rayleigh damping [1/s]"
     )
     stiffness_damping: Annotated[float, between(0.0, 1e6)] = option(
-        Damping.stiffness_seconds,
-        "coefficient of the stiffness in Rayleigh damping [s]",
+        Damping.stiffness_seconds, "coefficient of the stiffness in Rayleigh damping [s]"
     )
     contact_seconds: Annotated[float, between(1e-9, 10.0)] = option(
         2e-4, "duration of the force in the sound [s]"
@@ -134,11 +130,8 @@ def respond(
 ) -> ResponseFile:
     """Strike the solid of the modes file `truth`, and what the `candidates` by name take it for.
 
-    Raises
-    ------
-    UserError
-        If a file is unusable or holds no elastic mode, a point is away from the surface, or the
-        motion leaves the range of numbers.
+    Raises UserError if a file is unusable or holds no elastic mode, a point is away from the
+    surface, or the motion leaves the range of numbers.
     """
     reference = read_elastic(truth)
     points = choose_contacts(reference, options.strike, options.observed)
@@ -155,6 +148,7 @@ def respond(
         for name, part in seen.items()
     }
     sounds = _played(seen, options)
+    heard = sounds[TRUTH].any()
     for name in seen:
         if not (np.isfinite(motions[name]).all() and np.isfinite(sounds[name]).all()):
             raise UserError(
@@ -171,7 +165,7 @@ def respond(
                 sounds[name],
                 int(is_audible(part.eigenvalues).sum()),
                 relative_difference(motions[name], motions[TRUTH]),
-                _distance(sounds[name], sounds[TRUTH]),
+                spectral_distance(sounds[name], sounds[TRUTH]) if heard else float("nan"),
             )
             for name, part in seen.items()
         },
@@ -210,10 +204,7 @@ def write_response(path: str | Path, response: ResponseFile, parameters: dict[st
 def read_response(path: str | Path) -> ResponseFile:
     """Read the file.
 
-    Raises
-    ------
-    UserError
-        If it is missing, damaged or of another kind.
+    Raises UserError if it is missing, damaged or of another kind.
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         attributes = dict(file.attrs)
@@ -238,14 +229,9 @@ def read_response(path: str | Path) -> ResponseFile:
 
 
 def _played(seen: dict[str, Contacts], options: StrikeOptions) -> dict[str, Array]:
-    """Strikes at all points in turn, by name of the spectrum."""
     sounds = {
         name: contact_sounds(part, options.damping, options.contact_seconds)
         for name, part in seen.items()
     }
     loudest = np.abs(sounds[TRUTH]).max(axis=1)
     return {name: in_turn(sound, loudest) for name, sound in sounds.items()}
-
-
-def _distance(sound: Array, truth: Array) -> float:
-    return spectral_distance(sound, truth) if truth.any() else float("nan")

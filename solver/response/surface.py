@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from carillon.arrays import Array, Index
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import surface_points
 from carillon.fem.finite_cells.model import FiniteCellModel
@@ -17,8 +18,6 @@ from carillon.fem.geometry.faces import boundary_faces, surface_quads
 from carillon.fem.model import Solid
 
 logger = logging.getLogger(__name__)
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 2
 """Number of rings of faces that a normal is averaged over. Faces of voxels look along the axes
@@ -53,16 +52,13 @@ class Surface:
     points: Array
     outward: Array
     edge: float
-    nodes: NDArray[np.int64] | None
+    nodes: Index | None
 
     def nearest(self, point: Array, what: str, reach: float | None = None) -> int:
         """Number of the point nearest to `point` (3,) [m].
 
-        Raises
-        ------
-        UserError
-            If the point, which the message calls `what`, is further than `reach` [m] from the
-            surface, `REACH` unless told.
+        Raises UserError if the point, which the message calls `what`, is further than `reach` [m]
+        from the surface, `REACH` unless told.
         """
         reach = REACH * self.edge if reach is None else reach
         distance, index = cKDTree(self.points).query(point)
@@ -80,12 +76,7 @@ class Surface:
 
         That is the nearest node of voxels. Of finite cells it is the point itself, unless it lies
         outside, or deep inside: then the nearest place of the surface. A warning says how far that
-        is from a point that is not on the surface.
-
-        Raises
-        ------
-        UserError
-            See `nearest`.
+        is from a point that is not on the surface. Raises UserError, see `nearest`.
         """
         index = self.nearest(point, what, reach)
         place, outward = self.points[index], self.outward[index]
@@ -131,7 +122,7 @@ def surface_of(model: Solid) -> Surface:
     return Surface(surface_points(model.cells, voxels, outward), outward, mesh.edge, None)
 
 
-def surface_normals(mesh: HexMesh) -> tuple[NDArray[np.int64], Array]:
+def surface_normals(mesh: HexMesh) -> tuple[Index, Array]:
     """Nodes on the surface (s,) and their outward unit normals (s, 3).
 
     The normals of the faces are averaged over `SMOOTHING` rings of neighbours.

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from carillon.arrays import Array, Flags
 
 if TYPE_CHECKING:  # Its import takes long, and most of the room needs no surface.
     import trimesh
-
-Array = NDArray[np.float64]
 
 PROBE = 1e-3
 """Step from a vertex that tells inside from outside, over the surface's longest side."""
@@ -81,7 +80,7 @@ def _oriented(surface: trimesh.Trimesh) -> trimesh.Trimesh:
     return merged
 
 
-def _in_closed_part(oriented: trimesh.Trimesh) -> NDArray[np.bool_]:
+def _in_closed_part(oriented: trimesh.Trimesh) -> Flags:
     """Whether all triangles at each vertex (v,) belong to closed parts that face outwards."""
     from carillon.fem.geometry.facets import Facets, parts_of, signed_volumes
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.numerics import small_gemm
 from carillon.numerics.simd import compiler
 from carillon.numerics.simd_width import LANES
 from carillon.numerics.small_gemm import DEPTH, ROWS_NEAR, lanes_of, subtract
 from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System
-
-Array = NDArray[np.float64]
 
 compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 
@@ -27,17 +25,10 @@ class BlockBasis:
 
     Parameters
     ----------
-    system
-        Whose rows the vectors have.
     width
         Columns of a block at most.
     capacity
         Blocks that there is room for from the beginning.
-
-    Attributes
-    ----------
-    size
-        Number of vectors.
     """
 
     def __init__(self, system: System, width: int, capacity: int) -> None:

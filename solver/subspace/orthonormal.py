@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from carillon.arrays import Array
 
 DEPENDENT = 1e-11
 """Squared share of the vectors below which a direction is dropped."""
 WELL_CONDITIONED = 1e-3
 """Least diagonal entry of the scaled Gram matrix's Cholesky factor for which the factor is used."""
+INDEPENDENT = 1e-10
+"""Squared share of the vectors below which `whitening` drops a direction."""
 CANCELLED = 1e4
 """Ratio of the part taken from a vector to the rest from which it is taken twice."""
 
@@ -56,12 +59,31 @@ def largest_share(removed: Array, gram: Array) -> float:
     return float(np.sqrt((taken / left).max(initial=0.0)))
 
 
-def is_cancelled(gram: Array, removed: Array) -> bool:
-    """Whether so much was taken from vectors that what is left has to be made orthogonal again.
+def swept(
+    block: Array, sweep: Callable[[Array], Array], times_mass: Callable[[Array], Array], passes: int
+) -> tuple[Array, Array]:
+    """M times `block` (n, b), made orthogonal to a basis in place, and its Gram matrix (b, b).
 
-    Parameters
-    ----------
-    gram, removed
-        See `largest_share`.
+    A `sweep` takes from the block what is in the basis, and returns its coefficients (m, b).  It is
+    repeated, up to `passes`, while so much was taken that rounding has left some of it.
     """
-    return largest_share(removed, gram) > CANCELLED
+    for _ in range(passes):
+        removed = sweep(block)
+        mass_block = times_mass(block)
+        gram = block.T @ mass_block
+        if largest_share(removed, gram) <= CANCELLED:
+            break
+    return mass_block, gram
+
+
+def whitening(gram: Array) -> tuple[Array, Array]:
+    """Coefficients that make vectors with this Gram matrix orthonormal, dependent ones dropped.
+
+    Also returns the squared shares of the directions that were kept, ascending.
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    # numpy's eigh lets other threads run, scipy's does not.
+    spread, directions = np.linalg.eigh(gram * scale * scale[:, None])
+    independent = spread > INDEPENDENT * spread[-1]
+    kept = spread[independent]
+    return scale[:, None] * directions[:, independent] / np.sqrt(kept), kept

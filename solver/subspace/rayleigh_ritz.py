@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
-
-Array = NDArray[np.float64]
 
 RIGID_TOLERANCE = 1e-7
 """Share of a column's length below which its elastic part is rounding, and the column a rigid
@@ -123,12 +121,8 @@ def rigid_pairs(system: System) -> tuple[Array, Array]:
 def first_elastic_estimate(system: System) -> float:
     """Upper bound [rad^2/s^2] of the first elastic eigenvalue, from polynomial displacement fields.
 
-    It depends on the solid alone, not on a start block.
-
-    Raises
-    ------
-    ConvergenceError
-        If a motion other than the six rigid ones costs no energy.
+    It depends on the solid alone, not on a start block. Raises ConvergenceError if a motion other
+    than the six rigid ones costs no energy.
     """
     degrees = range(POLYNOMIAL_DEGREE + 1)
     powers = [(a, b, c) for a in degrees for b in degrees for c in degrees]

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.block import degrees_of_freedom
 from solver.assembly.system import System
-
-Array = NDArray[np.float64]
 
 
 def start_vector(system: System, seed: int, search: int = 0) -> Array:

@@ -1,4 +1,7 @@
-"""Where the eigenvalues of a solid are expected: Weyl's law, for bulky and for thin solids."""
+"""Where the eigenvalues of a solid are expected: Weyl's law, for bulky and for thin solids.
+
+Those so close that their modes may be mixed are one cluster: only the space they span is certain.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +9,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
+from carillon.arrays import Array
 from carillon.fem.model import Solid
-
-Array = NDArray[np.float64]
 
 NEIGHBOURHOOD = 2.0
 """Edge of the regions that vibrate as one material, in edges of a mode's share of the solid."""
 SPHERE = 36.0 * np.pi
 """Surface of a sphere to the third power, over its volume squared: no solid has less."""
+WEYL_EXPONENT = 2.0 / 3.0
+"""Exponent by which the eigenvalues of a compact body grow with their number."""
+CLUSTER_GAP = 1e-3
+"""Largest relative distance of neighbours in a cluster of eigenvalues."""
 
 
 @dataclass(frozen=True)
 class CountingLaw:
     """About how many eigenvalues omega^2 lie below a value: the sum of `terms` omega^3, ^2 and ^1.
 
-    Attributes
-    ----------
-    terms
-        Of bulk waves [s^3], and of the in-plane [s^2] and flexural [s] waves of walls.
+    The terms are of bulk waves [s^3], and of the in-plane [s^2] and flexural [s] waves of walls.
     """
 
     terms: tuple[float, float, float]
@@ -71,6 +73,8 @@ class CountingLaw:
 
     def eigenvalue(self, number: float) -> float:
         """Value [rad^2/s^2] that about `number` eigenvalues, one at least, lie below."""
+        from scipy.optimize import brentq  # Its import takes long.
+
         number = max(number, 1.0)
         cubic, square, linear = self.terms
 
@@ -93,3 +97,16 @@ def _regions(grid: NDArray[np.integer], young: Array, size: float) -> tuple[Arra
     _, region = np.unique(number, return_inverse=True)
     cells = np.bincount(region)
     return np.exp(np.bincount(region, logarithms) / cells), cells / len(grid)
+
+
+def clusters(values: Array, gap: float = CLUSTER_GAP) -> list[slice]:
+    """Runs of ascending `values` whose neighbours are relatively closer than `gap`.
+
+    Examples
+    --------
+    >>> clusters(np.array([1.0, 2.0, 2.0001, 3.0]))
+    [slice(0, 1, None), slice(1, 3, None), slice(3, 4, None)]
+    """
+    breaks = np.flatnonzero(np.diff(values) > gap * values[1:]) + 1
+    bounds = [0, *breaks.tolist(), len(values)]
+    return [slice(start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]

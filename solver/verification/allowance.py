@@ -11,12 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from solver.verification.residuals import ORTHOGONALITY_TOLERANCE
-
-Array = NDArray[np.float64]
 
 ACCEPTED = 10.0
 """Accepted relative error of an eigenvalue, as a multiple of the tolerance of the run, which stops

@@ -1,4 +1,7 @@
-"""Audits of modes files: the evidence that a file holds, and what is wrong with it."""
+"""Audits of modes files: the evidence that a file holds, and what is wrong with it, in sentences.
+
+The limits follow from a tolerance, see docs/explanation/trust.md.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,30 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES
 from carillon.files.paths import by_stem
 from solver.correction.criteria import EIGENVALUE_TOLERANCE
-from solver.files.modes_file import ModesFile, read_modes
+from solver.files.modes_file import ModesFile, frequencies, read_modes
+from solver.verification.allowance import (
+    ACCEPTED,
+    accepted_errors,
+    orthogonality_limit,
+    residual_limits,
+)
 from solver.verification.evidence import ModesEvidence, measure_evidence
-from solver.verification.faults import faults
+
+ROUNDING = 1e-9
+"""Largest relative difference by rounding between a frequency and that of its eigenvalue."""
 
 
 @dataclass(frozen=True)
 class Audit(ModesEvidence):
     """Evidence, and the faults that follow from it.
 
-    Attributes
-    ----------
-    faults
-        What is wrong, a sentence each, see `solver.verification.faults`.
+    The `faults` say what is wrong, a sentence each.
     """
 
     faults: list[str]
@@ -37,12 +48,8 @@ def audit_files(
 ) -> dict[str, Audit]:
     """Audits of modes files, see `carillon.files.paths.by_stem` for their names.
 
-    The eigenvalues were computed to the `tolerance`.
-
-    Raises
-    ------
-    UserError
-        If a file is unusable, or its audit leaves the range of numbers.
+    The eigenvalues were computed to the `tolerance`. Raises UserError if a file is unusable, or its
+    audit leaves the range of numbers.
     """
     return {label: _audited(path, tolerance) for label, path in by_stem(paths).items()}
 
@@ -58,3 +65,45 @@ def audit(file: ModesFile, tolerance: float = EIGENVALUE_TOLERANCE) -> Audit:
     """Audit the contents of a modes file, see `measure_evidence` for parameters and errors."""
     evidence = measure_evidence(file, tolerance)
     return Audit(**vars(evidence), faults=faults(file, evidence, tolerance))
+
+
+def faults(file: ModesFile, evidence: ModesEvidence, tolerance: float) -> list[str]:
+    """A sentence for each fault of a modes file, whose eigenvalues were asked for to a `tolerance`.
+
+    Solids that hang on hinges have more than six rigid motions, which is no fault of the modes.
+    """
+    sentences = []
+    if evidence.counted is not None and evidence.counted != evidence.expected:
+        missing = evidence.counted - evidence.expected
+        things = "1 eigenvalue is" if abs(missing) == 1 else f"{abs(missing):,} eigenvalues are"
+        sentences.append(f"{things} {'missing' if missing > 0 else 'too many'}")
+    if evidence.rigid_modes < RIGID_MODES:
+        sentences.append(f"{evidence.rigid_modes} of {RIGID_MODES} rigid motions are there")
+    limit = orthogonality_limit(evidence.unknowns)
+    if evidence.orthogonality > limit:
+        sentences.append(
+            f"modes are orthonormal to {evidence.orthogonality:.1e}, {limit:.1e} is required"
+        )
+    values, residuals = file.eigenvalues, np.array(evidence.energy_residuals)
+    errors = accepted_errors(values, np.array(evidence.rounding), ACCEPTED * tolerance)
+    allowed = residual_limits(values, errors)
+    over = np.flatnonzero(residuals[RIGID_MODES:] > allowed[RIGID_MODES:]) + RIGID_MODES
+    if len(over):
+        worst = over[np.argmax(residuals[over] / allowed[over])]
+        modes = "1 mode has" if len(over) == 1 else f"{len(over):,} modes have"
+        sentences.append(
+            f"{modes} too large a residual, mode {worst + 1} {residuals[worst]:.1e} in energy, "
+            f"where a tolerance of {tolerance:g} allows {allowed[worst]:.1e}"
+        )
+    off = np.array(evidence.quotient_errors)
+    far = np.flatnonzero(off * values > errors)
+    if len(far):
+        sentences.append(
+            f"the eigenvalue of mode {far[0] + 1} is {off[far[0]]:.1e} off its shape's Rayleigh "
+            "quotient"
+        )
+    right = frequencies(values)
+    differ = np.flatnonzero(np.abs(file.frequencies - right) > ROUNDING * right.max())
+    if len(differ):
+        sentences.append(f"the frequency of mode {differ[0] + 1} is not that of its eigenvalue")
+    return sentences

@@ -9,27 +9,29 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.geometry import blocks_with_coarse, prolongation
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from carillon.files.paths import by_stem
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
 from solver.response.points import interpolation
-from solver.subspace.spectrum import clusters
-from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
+from solver.subspace.weyl import clusters
 from solver.verification.matching import (
+    AUDIBLE_LAST,
     SAME,
+    eigenvalue_errors,
+    frequency_errors,
     match_clusters,
     mode_overlaps,
     recognised,
     subspace_angles,
 )
-from solver.verification.materials import material_difference, on_one_mesh
 from solver.verification.residuals import recomputed_residuals
 
-Array = NDArray[np.float64]
+EQUAL = 1e-9
+"""Largest relative difference of two constants that count as the same."""
 
 
 @dataclass
@@ -59,7 +61,7 @@ class SpectrumComparison:
         `matching.recognised`, and how many of these have `moved` to another number;
         None on the truth's own mesh, where numbers tell.
     material
-        In what the material differs, see `materials`; None where it is the same.
+        In what the material differs, see `material_difference`; None where it is the same.
     """
 
     candidate: str
@@ -83,10 +85,8 @@ class SpectrumComparison:
 def compare_files(candidate: str | Path, truth: str | Path) -> SpectrumComparison:
     """Compare two modes files of one solid, of any meshes and discretisations.
 
-    Raises
-    ------
-    UserError
-        If a file is unusable or holds no elastic mode to compare, or they are of other solids.
+    Raises UserError if a file is unusable or holds no elastic mode to compare, or they are of other
+    solids.
     """
     (comparison,) = compare_each([candidate], truth).values()
     return comparison
@@ -97,12 +97,8 @@ def compare_each(
 ) -> dict[str, SpectrumComparison]:
     """Compare several modes files with one that is taken for the truth.
 
-    See `carillon.files.paths.by_stem` for the names of the comparisons.
-
-    Raises
-    ------
-    UserError
-        See `compare_files`.
+    See `carillon.files.paths.by_stem` for the names of the comparisons. Raises UserError, see
+    `compare_files`.
     """
     exact = read_elastic(truth)
     matrix = assembled(exact.model)[1]
@@ -125,7 +121,6 @@ def compare_modes(candidate: ModesFile, truth: ModesFile) -> SpectrumComparison:
 def _compared(
     candidate: str, a: ModesFile, truth: str, b: ModesFile, M: sp.csr_matrix
 ) -> SpectrumComparison:
-    """Errors of a candidate, the mass matrix of the truth being at hand."""
     assert a.modes is not None
     count = min(len(a.eigenvalues), len(b.eigenvalues))
     elastic = slice(RIGID_MODES, count)
@@ -207,3 +202,37 @@ def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array:
     else:
         nodal = prolongation(blocks)
     return np.asarray(sp.kron(nodal, sp.identity(3), format="csr") @ file.modes)
+
+
+def on_one_mesh(one: Solid, other: Solid) -> bool:
+    """Whether two solids have the same elements and nodes."""
+    return np.array_equal(one.connectivity, other.connectivity) and np.array_equal(
+        one.mesh.node_grid, other.mesh.node_grid
+    )
+
+
+def material_difference(one: Solid, truth: Solid) -> dict[str, Any] | None:
+    """In what the material of a solid differs from the truth's; None where it is the same.
+
+    Young's moduli are compared on one mesh alone, since a coarse element has moduli of its own.
+    Returns of what differs: `poisson` and `density_kg_per_m3`, each with the solid's own value and
+    the truth's, and `young`: the number of `cells` that differ, that of `all`, and the `largest`
+    relative difference (infinite from zero).
+    """
+    differing: dict[str, Any] = {}
+    for name, a, b in (
+        ("poisson", one.poisson, truth.poisson),
+        ("density_kg_per_m3", one.density, truth.density),
+    ):
+        if abs(a - b) > EQUAL * abs(b):
+            differing[name] = [float(a), float(b)]
+    if on_one_mesh(one, truth) and one.young.shape == truth.young.shape:
+        step = np.abs(one.young - truth.young)
+        other = step > EQUAL * np.abs(truth.young)
+        if other.any():
+            # One row a cell, whatever values it has.
+            cells = other.reshape(len(other), -1).any(axis=1)
+            with np.errstate(divide="ignore"):
+                largest = float((step[other] / np.abs(truth.young[other])).max())
+            differing["young"] = {"cells": int(cells.sum()), "all": len(cells), "largest": largest}
+    return differing or None

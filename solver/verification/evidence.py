@@ -11,16 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from carillon.processes.petsc import PETSc
-from solver.assembly.petsc_matrix import distributed_matrix
 from solver.assembly.sparse import assembled
-from solver.assembly.system import assemble
+from solver.assembly.system import assemble, distributed_matrix
 from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import ModesFile
-from solver.linear.factorisation import factorised
+from solver.linear.factorisation import factorised, solve_dense
 from solver.reference.truth import can_count, count_negative
 from solver.subspace.rayleigh_ritz import first_elastic_estimate
 from solver.verification.residuals import (
@@ -29,8 +28,6 @@ from solver.verification.residuals import (
     recomputed_residuals,
     residual_scale,
 )
-
-Array = NDArray[np.float64]
 
 GAP, GAP_OF_TOLERANCE = 1e-4, 40.0
 """Relative width of a gap in which inaccurate eigenvalues cannot be mistaken for others, and the
@@ -90,10 +87,7 @@ class ModesEvidence:
 def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:
     """Measure the evidence in a modes file, whose eigenvalues were computed to a `tolerance`.
 
-    Raises
-    ------
-    ArithmeticError
-        If residuals or products of the modes are not finite.
+    Raises ArithmeticError if residuals or products of the modes are not finite.
     """
     assert file.modes is not None
     values, modes = file.eigenvalues, file.modes
@@ -135,13 +129,10 @@ def _energy_residuals(
         few = columns[start : start + COLUMNS_AT_ONCE]
         chosen = modes[:, few]
         residual = np.asfortranarray(K @ chosen - (M @ chosen) * values[few])
-        right = PETSc.Mat().createDense(residual.shape, array=residual, comm=MPI.COMM_SELF)
-        solution = right.duplicate()
-        factorisation.getFactorMatrix().matSolve(right, solution)
-        square = np.einsum("ij,ij->j", residual, solution.getDenseArray(readonly=True))
+        factor = factorisation.getFactorMatrix()
+        solution = solve_dense(factor, residual, len(residual), MPI.COMM_SELF)
+        square = np.einsum("ij,ij->j", residual, solution)
         result[few] = np.sqrt(np.maximum(square, 0.0) / scale[few])
-        right.destroy()
-        solution.destroy()
     factorisation.destroy()
     matrix.destroy()
     return result
@@ -179,10 +170,7 @@ def _count_rigid(file: ModesFile, K: sp.csr_matrix) -> int:
 def gap_below_last(values: Array, gap: float = GAP) -> tuple[float, int]:
     """Middle of the last gap between ascending values that is wide, or else of the widest one.
 
-    Returns
-    -------
-    tuple[float, int]
-        The value in the gap, and how many of the `values` are below it.
+    Returns the value in the gap, and how many of the `values` are below it.
 
     Examples
     --------

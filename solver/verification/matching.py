@@ -1,4 +1,4 @@
-"""Which mode of one solution is which of another by shape, and the angles between both."""
+"""Which mode of one solution is which of another, by shape or by index, and how far they differ."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from carillon.arrays import Array, Index
 from carillon.fem.model import RIGID_MODES
-
-Array = NDArray[np.float64]
 
 SAME = 0.5
 """Least overlap of two modes that count as the same."""
 DEPENDENT = 1e-10
 """Share of the largest eigenvalue of a Gram matrix below which vectors are dependent."""
+
+AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
+"""Mode numbers, from 1, of the frequency errors that are reported for coarsened models."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Matching:
         With any mode of the other solution.
     """
 
-    partners: NDArray[np.int64]
+    partners: Index
     overlaps: Array
     largest: Array
 
@@ -42,10 +43,7 @@ class Matching:
 def mode_overlaps(modes: Array, others: Array, weighted: Array) -> Array:
     """Overlaps |v^T M w| (k, l) of modes v (n, k) of unit mass and others w (n, l), made so.
 
-    Parameters
-    ----------
-    others, weighted
-        The other modes on the truth's nodes, and their products with its mass matrix.
+    `others` are on the truth's nodes, and `weighted` their products with its mass matrix.
     """
     norms = np.sqrt((others * weighted).sum(axis=0))
     return np.asarray(np.abs(modes.T @ (weighted / norms)))
@@ -55,12 +53,9 @@ def of_clusters(overlaps: Array, rows: list[slice], columns: list[slice]) -> Arr
     """Overlaps (k, l) of the spaces that modes belong to, from those of single modes.
 
     Modes of a cluster may be mixed, by which they resemble no single mode of the other solution.
-    Each has the root mean square of the cosines between both clusters' spaces instead.
-
-    Parameters
-    ----------
-    rows, columns
-        Clusters of the truth and of the other solution, see `solver.subspace.spectrum.clusters`.
+    Each has the root mean square of the cosines between both clusters' spaces instead. `rows` and
+    `columns` are clusters of the truth and of the other solution, see
+    `solver.subspace.weyl.clusters`.
 
     Examples
     --------
@@ -116,12 +111,8 @@ def recognised(errors: Array, overlaps: Array) -> dict[str, Any]:
     """Number of modes that overlap their partner by `SAME`, and rms and worst of their errors.
 
     A partner of another shape, which a mode gets that the other solution lacks, has a frequency of
-    its own, and says nothing.
-
-    Parameters
-    ----------
-    errors, overlaps
-        (k,) relative errors of the partners' frequencies, and overlaps with them, of modes 7, 8,...
+    its own, and says nothing. `errors` and `overlaps` (k,) are those of the partners of modes 7, 8,
+    ...: of the frequencies, relative, and of the shapes.
 
     Examples
     --------
@@ -163,3 +154,60 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
         square = np.linalg.eigvalsh(outside.T @ (M @ outside))[-1]
         angles[index] = np.arcsin(min(1.0, np.sqrt(max(square, 0.0))))
     return angles
+
+
+@dataclass(frozen=True)
+class FrequencyErrors:
+    """Relative errors of the frequencies of modes `first`..`last`, matched by index.
+
+    Attributes
+    ----------
+    rms, mean
+        Root mean square and signed mean.
+    worst, worst_mode
+        The error of largest magnitude, with its sign, and the mode that has it.
+    """
+
+    first: int
+    last: int
+    rms: float
+    mean: float
+    worst: float
+    worst_mode: int
+
+
+def frequency_errors(errors: Array, last: int) -> FrequencyErrors:
+    """Summary of the relative `errors` (k,) of modes 7, 8, ... up to `last`, if there are so many.
+
+    Examples
+    --------
+    >>> frequency_errors(np.array([0.25, -0.5, 1.0]), last=8)
+    FrequencyErrors(first=7, last=8, rms=0.395..., mean=-0.125, worst=-0.5, worst_mode=8)
+    """
+    part = errors[: last - RIGID_MODES]
+    worst = int(np.argmax(np.abs(part)))
+    first = RIGID_MODES + 1
+    return FrequencyErrors(
+        first,
+        RIGID_MODES + len(part),
+        float(np.sqrt(np.mean(part**2))),
+        float(np.mean(part)),
+        float(part[worst]),
+        first + worst,
+    )
+
+
+def eigenvalue_errors(values: Array, exact: Array) -> dict[str, float]:
+    """Median, 90th percentile and maximum of |values - exact| / exact, matched by index.
+
+    Examples
+    --------
+    >>> eigenvalue_errors(np.array([1.0, 2.5, 4.0]), np.array([1.0, 2.0, 4.0]))["max"]
+    0.25
+    """
+    error = np.abs(values / exact - 1.0)
+    return {
+        "median": float(np.median(error)),
+        "p90": float(np.quantile(error, 0.9)),
+        "max": float(error.max()),
+    }

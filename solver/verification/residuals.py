@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
 from solver.subspace.rayleigh_ritz import first_elastic_estimate
 
 if TYPE_CHECKING:
     from solver.assembly.system import System
-
-Array = NDArray[np.float64]
 
 ROUNDING = 100.0 * float(np.finfo(float).eps)
 """Share of the eigenvalue that a mode would have without cancellation of neighbours' strains, below

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -103,7 +104,7 @@ class _CoarseElements(_FineElements):
         return self._model(self._moduli(young))
 
     def solve(self, solver: ModalSolver, young: Array, *how: Any) -> Modes:
-        return solver.solve_coarse(self._moduli(young), *how)
+        return partial(solver.solve, coarsened=True)(self._moduli(young), *how)
 
     def slopes(self, young: Array, directions: Array) -> Array:
         blocks = self._blocks

@@ -11,7 +11,7 @@ import scipy.linalg as la
 from carillon.arrays import Array
 from solver.analysis.modes import Modes
 from solver.linear import Inverse
-from solver.subspace.orthonormal import is_cancelled
+from solver.subspace.orthonormal import swept, whitening
 
 SHIFTS = (0.5, 0.75)
 """Least and greatest shift over the last computed eigenvalue.  A Krylov space about such a shift is
@@ -22,8 +22,6 @@ MOST_PASSES = 3
 """Greatest number of orthogonalisations of a block; two are enough but for rounding."""
 CLEAR = 0.2
 """Least distance of a usable shift from all eigenvalues, over that of the best shift."""
-DEPENDENT = 1e-10
-"""Squared norm of an orthogonalised vector, over that of the vector, below which it is dropped."""
 
 
 def outside_response(
@@ -90,8 +88,8 @@ class _Space:
     def add(self, block: Array) -> Array:
         """Enlarge the subspace by a block (3 n, b), which is overwritten; M times the new
         vectors."""
-        mass_block, gram = self._made_orthogonal(block)
-        weights = _orthonormal(gram)
+        mass_block, gram = swept(block, self._sweep, self._system.times_mass, MOST_PASSES)
+        weights, _ = whitening(gram)
         block, mass_block = block @ weights, mass_block @ weights
         end = self._size + weights.shape[1]
         self._vectors[:, self._size : end] = block
@@ -101,17 +99,11 @@ class _Space:
         self.stiffness = _bordered(self.stiffness, last)
         return mass_block
 
-    def _made_orthogonal(self, block: Array) -> tuple[Array, Array]:
-        """Orthogonalise `block` in place; M times it, and its Gram matrix."""
+    def _sweep(self, block: Array) -> Array:
         vectors, mass_vectors = self._vectors[:, : self._size], self._mass_vectors[:, : self._size]
-        for _ in range(MOST_PASSES):
-            overlap = mass_vectors.T @ block
-            block -= vectors @ overlap
-            mass_block = self._system.times_mass(block)
-            gram = block.T @ mass_block
-            if not is_cancelled(gram, overlap):
-                break
-        return mass_block, gram
+        overlap = mass_vectors.T @ block
+        block -= vectors @ overlap
+        return np.asarray(overlap)
 
 
 def _bordered(matrix: Array, last: Array) -> Array:
@@ -146,11 +138,3 @@ def lies_between(values: Array, shift: float) -> bool:
 
 def _distance(values: Array, shift: float) -> float:
     return float(np.abs(values - shift).min())
-
-
-def _orthonormal(gram: Array) -> Array:
-    """Coefficients that make vectors with this Gram matrix orthonormal, dependent ones dropped."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    spread, directions = np.linalg.eigh(gram * scale * scale[:, None])
-    kept = spread > DEPENDENT
-    return np.asarray(scale[:, None] * directions[:, kept] / np.sqrt(spread[kept]))

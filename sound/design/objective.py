@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from carillon.arrays import Array, Index
-from solver.subspace.spectrum import clusters
+from solver.subspace.weyl import clusters
 from sound.design.pitch import bark, bark_slope
 
 if TYPE_CHECKING:

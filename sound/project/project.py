@@ -27,8 +27,8 @@ from carillon.parameters.quantities import (
 )
 from carillon.parameters.sentences import ParameterError
 from solver.analysis.problem import AUTO, ProblemOptions
+from solver.coarsening.choice import LINEAR
 from solver.coarsening.forest import FOREST
-from solver.coarsening.linear import LINEAR
 from sound.project.settings import (
     DampingSettings,
     MaterialSettings,

@@ -13,7 +13,7 @@ from carillon.fem.model import RIGID_MODES, Solid
 from solver.files.modes_file import ModesFile
 from solver.response.points import motion_at
 from solver.response.response import Damping
-from solver.subspace.spectrum import clusters
+from solver.subspace.weyl import clusters
 from sound.project.design import Design
 
 

@@ -25,8 +25,7 @@ from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
 from carillon.files.cache import remembered
 from carillon.processes.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
-from solver.accuracy.lattices import covering_on, voxel_lattice
-from solver.accuracy.voxels import Reference
+from solver.accuracy.voxels import Reference, covering_on, voxel_lattice
 from solver.analysis.problem import AUTO
 from solver.files.modes_file import read_modes, write_modes
 from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors

@@ -27,8 +27,8 @@ from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.refinement.errors import FROM_SOLID
-from solver.refinement.fine_start import FineStart
-from solver.verification.errors import frequency_errors
+from solver.refinement.inverse_iteration import FineStart
+from solver.verification.matching import frequency_errors
 from studies.accuracy.solids import ANGLES
 
 ELASTIC = 30

@@ -17,7 +17,7 @@ from carillon.fem.model import RIGID_MODES
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from solver.analysis.problem import DISCRETISATIONS
-from solver.verification.errors import frequency_errors
+from solver.verification.matching import frequency_errors
 from studies.accuracy.solids import ANGLES, POISSON, SOLIDS, ReferenceSolid
 from studies.accuracy.spectra import Spectrum, cells
 from studies.accuracy.tetrahedra import ORDERS, missing, tetrahedra, versions

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from carillon.arrays import Array, Index
 from carillon.errors import one_line
 from carillon.processes.slepc import SLEPc
-from solver.assembly.petsc_matrix import distributed_matrix
+from solver.assembly.system import distributed_matrix
 from solver.linear.factorisation import factor_package
 from studies.accuracy.solids import DENSITY, POISSON, YOUNG, ReferenceSolid
 from studies.accuracy.spectra import Spectrum

@@ -189,7 +189,7 @@ class Methods:
         solver, start = self._warm
         model, coarsened = self._model("ddfem", changed=True)
         begin = self._now()
-        result = solver.solve_coarse(None if model is None else model.young, start)
+        result = solver.solve(None if model is None else model.young, start, coarsened=True)
         return self._run(result, begin, coarsened)
 
     def release(self) -> None:

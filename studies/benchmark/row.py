@@ -17,7 +17,7 @@ from carillon.fem.geometry import surface_name
 from carillon.processes.blas import blas_name, loaded_blas
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
-from solver.verification.errors import AUDIBLE_LAST
+from solver.verification.matching import AUDIBLE_LAST
 from studies.benchmark.further_rivals import RIVALS
 from studies.benchmark.methods import MethodRun, Methods
 from studies.benchmark.options import BenchmarkOptions

@@ -8,7 +8,7 @@ from typing import Any
 from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import frequencies
-from solver.verification.errors import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
+from solver.verification.matching import AUDIBLE_LAST, eigenvalue_errors, frequency_errors
 
 
 def spectrum_error(values: Array, exact: Array) -> dict[str, float]:

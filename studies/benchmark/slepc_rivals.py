@@ -18,7 +18,7 @@ from mpi4py import MPI
 from carillon.errors import ConvergenceError
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
-from solver.assembly.petsc_matrix import distributed_matrix
+from solver.assembly.system import distributed_matrix
 from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX
 from studies.benchmark.rivals import petsc_options

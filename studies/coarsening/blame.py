@@ -9,8 +9,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.fem.geometry import Blocks
 from carillon.fem.model import ElasticModel
-from solver.refinement.energies import element_energies, fine_energies
-from solver.refinement.estimate import error_shares
+from solver.refinement.estimate import element_energies, error_shares, fine_energies
 
 LISTED = 10
 """Elements that are named for each mode."""

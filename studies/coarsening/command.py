@@ -18,8 +18,7 @@ from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import METHODS
 from solver.coarsening.forest import FOREST
 from solver.commands.running import add_voxels, on_ranks, parameters, require_outputs, write_json
-from solver.refinement.errors import LAST
-from solver.refinement.options import ALLOWED_ERROR
+from solver.refinement.errors import ALLOWED_ERROR, LAST
 from studies.coarsening.case import PICTURES, rate_coarsening
 from studies.coarsening.picture_file import write_pictures
 

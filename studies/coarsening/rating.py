@@ -13,8 +13,13 @@ from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from solver.files.modes_file import frequencies
 from solver.refinement.estimate import nodal_mass_matrix
-from solver.verification.errors import frequency_errors
-from solver.verification.matching import SAME, match_modes, mode_overlaps, recognised
+from solver.verification.matching import (
+    SAME,
+    frequency_errors,
+    match_modes,
+    mode_overlaps,
+    recognised,
+)
 from studies.coarsening.blame import Blame
 from studies.coarsening.picture_file import ModePicture
 

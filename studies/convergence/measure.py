@@ -24,7 +24,7 @@ from solver.files.modes_file import read_modes
 from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver
-from solver.verification.errors import eigenvalue_errors
+from solver.verification.matching import eigenvalue_errors
 
 RANDOM = "random"
 STARTS = (*(f"hcms-{interface}" for interface in INTERFACES), RANDOM)

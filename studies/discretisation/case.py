@@ -15,12 +15,12 @@ from carillon.fem import geometry
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, Constants
 from carillon.limits import require_constants
-from solver.accuracy.lattices import voxel_lattice
 from solver.accuracy.material import INTERPOLATED, PlacedMaterial
+from solver.accuracy.voxels import voxel_lattice
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST
-from solver.verification.errors import frequency_errors
+from solver.verification.matching import frequency_errors
 from studies.discretisation.methods import TOLERANCE, TimedSpectrum, Ways, voxel_mesh
 from studies.discretisation.truth import FINER, LEFT, LEFT_OF_NOISE, truth_between
 

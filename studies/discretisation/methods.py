@@ -15,9 +15,9 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.model import Constants, Solid, fine_model
-from solver.accuracy.divide import DividedCells
-from solver.accuracy.lattices import covering_on
+from solver.accuracy.divide import DividedCells, solve_refined
 from solver.accuracy.material import ARITHMETIC, HARMONIC, PlacedMaterial
+from solver.accuracy.voxels import covering_on
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
@@ -25,9 +25,8 @@ from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import CHECKS, frequencies
 from solver.refinement.coarse_or_fine import solve_coarsened
+from solver.refinement.errors import ALLOWED_DISTANCE, ALLOWED_ERROR
 from solver.refinement.model_solver import SolveByOptions
-from solver.refinement.options import ALLOWED_DISTANCE, ALLOWED_ERROR
-from solver.refinement.refine import solve_refined
 from solver.refinement.refined_model import RefinedModel
 
 TOLERANCE = 1e-6

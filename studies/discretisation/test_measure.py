@@ -10,8 +10,8 @@ import pytest
 
 from carillon.fem.geometry import builtin_surface, hexmesh_from_grid
 from carillon.fem.geometry.grid import Grid
-from solver.accuracy.lattices import covering_on, voxel_lattice
 from solver.accuracy.material import HARMONIC, PlacedMaterial
+from solver.accuracy.voxels import covering_on, voxel_lattice
 from studies.discretisation.methods import TimedSpectrum, scaled, voxel_mesh
 from studies.discretisation.truth import truth_between
 

@@ -21,7 +21,7 @@ from forests.default import default_path
 from forests.evaluate import MOST_BLOCKS, coarsen, coarsen_with_derivatives
 from forests.model import FILLED, VOID, Model, load_model
 from forests.scaling import FEATURES, prepare
-from forests.training.join import join
+from forests.training.leaves import join
 from studies.forests.synthetic import coherent_blocks, complete_forests, random_blocks
 
 logger = logging.getLogger(__name__)

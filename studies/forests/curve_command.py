@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 
 from carillon.command_line.outputs import require_outputs
-from forests.commands.training import add_training, add_workers, training_of
+from carillon.parameters.command_line import collect
+from forests.commands.training import add_training, add_workers
 from forests.training.dataset import open_dataset
+from forests.training.train import TrainingOptions
 from studies.base.command_results import add_outputs, publish
 from studies.forests import training
 
@@ -23,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Train on each number of rows and print the scores."""
     require_outputs(arguments, arguments.datasets)
-    how = training_of(arguments)
+    how = collect(TrainingOptions, arguments)
     dataset = open_dataset(arguments.datasets)
     counts = training.require_counts(arguments.rows)
     rows = training.learning_curve(dataset, how, counts, arguments.workers)

@@ -18,10 +18,17 @@ from dataset_gen.settings import ShardOptions
 from forests.layout import NODE
 from forests.model import RECORD
 from forests.scaling import TRANSFORMS
-from forests.training.dataset import Dataset, Samples, dataset_of, joined
+from forests.training.dataset import (
+    STUDIED,
+    Dataset,
+    Samples,
+    dataset_of,
+    joined,
+    modulus_over_scale,
+    rows_of,
+)
 from forests.training.leaves import answers_of
 from forests.training.ranks import Ranks
-from forests.training.rows import STUDIED, modulus_over_scale, rows_of
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
 from forests.training.train import Trained, TrainingOptions, train_trees

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 
 from carillon.command_line.outputs import require_outputs
-from forests.commands.training import add_training, add_workers, training_of
+from carillon.parameters.command_line import collect
+from forests.commands.training import add_training, add_workers
 from forests.training.dataset import open_dataset
+from forests.training.train import TrainingOptions
 from studies.base.command_results import add_outputs, publish
 from studies.forests import training
 
@@ -22,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Train every variant and print their scores."""
     require_outputs(arguments, arguments.datasets)
-    how = training_of(arguments)
+    how = collect(TrainingOptions, arguments)
     names = arguments.only or tuple(training.VARIANTS)
     rows = training.variants(open_dataset(arguments.datasets), how, arguments.workers, names)
     publish(arguments, rows, training.as_text(rows), arguments.workers)

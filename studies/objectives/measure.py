@@ -23,14 +23,13 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
+from solver.coarsening.choice import FitCoarsening, LinearCoarsening
 from solver.coarsening.coarsening import Coarsening
-from solver.coarsening.fit import FitCoarsening
 from solver.coarsening.forest import FOREST, ForestCoarsening, forest_or_reason
-from solver.coarsening.linear import LinearCoarsening
 from solver.coarsening.model import block_moduli, coarse_model
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.modes_file import CHECKS, frequencies
-from solver.verification.errors import AUDIBLE_LAST, frequency_errors
+from solver.verification.matching import AUDIBLE_LAST, frequency_errors
 
 logger = logging.getLogger(__name__)
 

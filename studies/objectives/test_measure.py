@@ -13,11 +13,10 @@ from dataset_gen.objectives import OBJECTIVES, fit
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.coarsening.choice import make_coarsening
-from solver.coarsening.fit import FitCoarsening
+from solver.coarsening.choice import FitCoarsening, make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import frequencies, read_modes
-from solver.verification.errors import frequency_errors
+from solver.verification.matching import frequency_errors
 from studies.objectives.measure import BASELINES, FOREST, rate_objectives
 from tests import solids
 

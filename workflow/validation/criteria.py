@@ -12,7 +12,7 @@ import numpy as np
 from carillon.fem.model import RIGID_MODES
 from carillon.files.yaml_input import read_own_yaml
 from solver.files.modes_file import frequencies
-from solver.verification.errors import AUDIBLE_FIRST, AUDIBLE_LAST
+from solver.verification.matching import AUDIBLE_FIRST, AUDIBLE_LAST
 from studies.base.numbers import show
 from workflow.report.findings import headline
 from workflow.validation import limits
