@@ -2,8 +2,10 @@
 
 import csv
 import re
+from collections.abc import Iterable, Mapping
 from html.parser import HTMLParser
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from studies.base.numbers import show
@@ -100,3 +102,33 @@ def assert_same_numbers(page: Page, tables: Path, name: str, hidden: tuple[str, 
             assert show(row.get(column.key), kind).replace("|", "/") in markdown
             if column.kind not in ("text", "range"):
                 assert raw[column.key] == ("" if value == "None" else value)
+
+
+def assert_holds(
+    page: Page,
+    study: Study,
+    folder: Path,
+    names: Iterable[str] = (),
+    hidden: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+) -> None:
+    """A page needs nothing else, and has all figures and the tables of a study, or those named."""
+    assert_self_contained(page)
+    assert {f"plot-{figure.file}" for figure in study.figures if not figure.of} <= set(page.ids)
+    for name in names or study.tables:
+        assert_same_numbers(page, folder / "tables", name, hidden.get(name, ()))
+
+
+def finished_page(study: Study, folder: Path, names: Iterable[str] = (), **hidden: Any) -> Page:
+    """The page of a study that has run, which tells where its numbers are from and proves them."""
+    page = Page(folder / "report.html")
+    assert_holds(page, study, folder, names, hidden)
+    for figure in study.figures:
+        (drawn,) = (folder / "figures").glob(re.sub(r"\{\w+\}", "*", f"{figure.file}.png"))
+        assert drawn.stat().st_size > 5000
+    for row in read_table(folder / "tables/provenance.json").rows:
+        assert all(row[key] for key in ("command", "commit", "config_hash", "versions"))
+    if (truths := folder / "tables/truths.json").is_file():
+        for row in read_table(truths).rows:
+            expected, counted = row["inertia"].split(" / ")
+            assert expected == counted
+    return page

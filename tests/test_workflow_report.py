@@ -1,6 +1,5 @@
 """Tables, numbers and aligned modes of the report."""
 
-import csv
 import doctest
 from types import SimpleNamespace
 
@@ -14,10 +13,10 @@ from studies.base.colours import COLOURS, themed
 from studies.base.media import cropped, highest_hertz, spectrogram_figure
 from studies.base.numbers import show
 from studies.base.style import svg
-from studies.base.table import Column, Table, read_table, write_table
+from studies.base.table import Column, Table
 from workflow.report.design_tables import costs, design, spread_of
-from workflow.report.methods_plot import methods_figure
 from workflow.report.mode_pictures import aligned, cluster
+from workflow.report.plots import methods_figure
 
 TABLE = Table(
     "demo",
@@ -29,16 +28,6 @@ TABLE = Table(
     ],
     [{"model": "bell", "seconds": 12.34, "error": 0.01234}, {"model": "bar", "seconds": 0.5}],
 )
-
-
-def test_a_table_survives_its_file_and_programs_get_all_digits(tmp_path):
-    write_table(TABLE, tmp_path)
-    assert read_table(tmp_path / "demo.json") == TABLE
-    lines = (tmp_path / "demo.csv").read_text().splitlines()
-    assert lines[:2] == ["# keys: model", "# kinds: text, seconds, percent"]
-    rows = list(csv.DictReader(lines[2:]))
-    assert rows[0] == {"model": "bell", "seconds [s]": "12.34", "error": "0.01234"}
-    assert rows[1]["error"] == ""
 
 
 def test_people_see_shown_columns_with_few_digits():

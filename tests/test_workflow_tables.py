@@ -76,10 +76,10 @@ def test_memory_is_what_the_control_group_allows(tmp_path):
 
 
 def test_conditions_that_all_rows_share_are_told_once():
-    assert SHARED is not None and not SHARED.differing
+    assert SHARED is not None and not SHARED["differing"]
     assert MISSING not in SHARED.texts.values()
     assert set(SHARED.texts) == set(LABELS) - {"differing"}
-    assert SHARED.configuration == settings.config_hash(CONFIG)
+    assert SHARED["configuration"] == settings.config_hash(CONFIG)
 
 
 def test_conditions_that_differ_between_rows_are_said_to():
@@ -88,10 +88,10 @@ def test_conditions_that_differ_between_rows_are_said_to():
         "bar": record(processor="Another", date="2026-02-01T10:00:00+00:00"),
     }
     differing = conditions(records, CONFIG, ONE_COLD_RUN)
-    assert differing.differing == "processor"
-    assert "(bell); Another (bar)" in differing.processor
+    assert differing["differing"] == "processor"
+    assert "(bell); Another (bar)" in differing["processor"]
     assert "not the same for all rows: processor" in differing.headline
-    assert differing.date == "2026-01-30 to 2026-02-01"
+    assert differing["date"] == "2026-01-30 to 2026-02-01"
 
 
 def test_no_results_no_conditions():
@@ -121,7 +121,9 @@ def test_a_table_survives_its_files(tmp_path, shared):
 def test_conditions_stand_in_every_form(tmp_path):
     write_table(table(SHARED), tmp_path)
     markdown = (tmp_path / "demo.md").read_text()
-    assert json.loads((tmp_path / "demo.json").read_text())["conditions"]["commit"] == SHARED.commit
+    assert (
+        json.loads((tmp_path / "demo.json").read_text())["conditions"]["commit"] == SHARED["commit"]
+    )
     lines = (tmp_path / "demo.csv").read_text().splitlines()
     for key, text in SHARED.texts.items():
         assert f"# {key}: {text}" in lines
@@ -134,6 +136,7 @@ def test_programs_skip_what_the_csv_file_says_about_itself(tmp_path):
         rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     assert [row["seconds [s]"] for row in rows] == ["0.5", ""]
     assert rows[0]["model"] == "bell #1, big"
+    assert (tmp_path / "demo.csv").read_text().startswith("# keys: model, mode\n# kinds: text, ")
 
 
 def test_pandas_reads_the_csv_file(tmp_path):
@@ -158,4 +161,4 @@ def test_scaling_keeps_the_slowest_run_beside_the_fastest():
     assert modelled_row.get("measured") is None and modelled_row["modelled"] == 0.6
     assert measured_row["misfit"] == pytest.approx(-0.2) and modelled_row["misfit"] is None
     assert "A bell, strong scaling: The model differs by up to 20%." in table.caption
-    assert table.conditions.runs.startswith("3")
+    assert table.conditions["runs"].startswith("3")

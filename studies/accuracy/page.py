@@ -1,7 +1,5 @@
 """The study of the discretisations as one page."""
 
-from __future__ import annotations
-
 from studies.accuracy.results import AccuracyStudy
 from studies.base.page import StudyPage, origins, section
 from studies.base.parts import grid, html, note, plot, prose
@@ -36,19 +34,19 @@ def page(study: AccuracyStudy, tables: dict[str, Table]) -> StudyPage:
             what do unknowns and time buy?""",
         sections=[
             section(
-                "equal",
                 "At equal cost",
                 note(study.without) or prose(rivals),
                 grid(tables["summary"], by="title"),
                 *(plot(study.drawn(name), text, name) for name, text in FIGURES.items()),
+                id="equal",
             ),
             section(
-                "levels",
                 "Every model",
                 grid(tables["levels"], by="title"),
                 prose(*(html("{title}, {label}: {problem}.", **row) for row in problems)),
+                id="levels",
             ),
-            section("references", "References", grid(tables["references"])),
+            section("References", grid(tables["references"])),
             origins(tables["provenance"]),
         ],
     )

@@ -1,14 +1,12 @@
 """Figures of the study."""
 
-from __future__ import annotations
-
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from studies.accuracy.results import AccuracyStudy
 from studies.accuracy.tables import LABELS
 from studies.base.colours import COLOURS
-from studies.base.style import plain_numbers
+from studies.base.style import logarithmic
 
 LOOKS = {
     "voxel": ("s-", COLOURS["hcms"]),
@@ -39,7 +37,7 @@ def _figure(study: AccuracyStudy, size: str, label: str) -> Figure:
         for discretisation in study.discretisations:
             levels = study.levels(solid, discretisation)
             look, colour = LOOKS[discretisation]
-            panel.loglog(
+            panel.plot(
                 [level[size] for level in levels],
                 [level["rms"] for level in levels],
                 look,
@@ -47,8 +45,7 @@ def _figure(study: AccuracyStudy, size: str, label: str) -> Figure:
                 markersize=4.5,
                 label=LABELS[discretisation],
             )
-        plain_numbers(panel.xaxis)
-        plain_numbers(panel.yaxis)
+        logarithmic(panel.xaxis, panel.yaxis)
         panel.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:g} %")
         panel.set_title(title)
     for panel in panels.flat[len(study.titles) :]:

@@ -1,7 +1,5 @@
 """What the study of the discretisations has found."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 
@@ -19,8 +17,7 @@ class AccuracyStudy(Results):
     @cached_property
     def measured(self) -> dict[str, Any]:
         """Output of `solver accuracy`."""
-        found: dict[str, Any] = self.read_json(FILE)
-        return found
+        return self.read_json(FILE)
 
     @property
     def origins(self) -> dict[str, Record]:

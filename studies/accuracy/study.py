@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from studies.base.study import Config, Figure, Study
 from workflow.arguments import options
 

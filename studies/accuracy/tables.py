@@ -1,7 +1,5 @@
 """Tables of the study: every model, and all of them at equal unknowns and at equal time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from studies.accuracy.results import AccuracyStudy

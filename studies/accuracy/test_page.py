@@ -1,7 +1,5 @@
 """The study of the discretisations: tables, figures and page from what the command measures."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -9,12 +7,11 @@ import yaml
 
 from studies.accuracy.config import AccuracySection
 from studies.accuracy.measure import AccuracyOptions, summarised
-from studies.accuracy.page import FIGURES
 from studies.accuracy.results import AccuracyStudy
 from studies.accuracy.solids import SOLIDS
 from studies.accuracy.study import ACCURACY
 from studies.accuracy.tables import LABELS
-from tests.pages import assert_same_numbers, assert_self_contained, page_of
+from tests.pages import assert_holds, page_of
 
 KINDS = list(LABELS)
 
@@ -64,10 +61,7 @@ def study(request, tmp_path) -> AccuracyStudy:
 
 def test_the_page_holds_tables_and_figures(study):
     shown = page_of(ACCURACY, study, study.folder / "report.html")
-    assert_self_contained(shown)
-    assert {f"plot-{name}" for name in FIGURES} <= set(shown.ids)
-    for name in ACCURACY.tables:
-        assert_same_numbers(shown, study.folder / "tables", name)
+    assert_holds(shown, ACCURACY, study.folder)
     assert "the solid is in 5 pieces" in shown.source
     assert ("Gmsh 4.15" in shown.source) == (study.without == "")
 

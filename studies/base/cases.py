@@ -1,7 +1,5 @@
 """Studies of solids, each at some resolutions and with some materials: a result file a case."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -14,6 +12,7 @@ from studies.base.results import Results
 from studies.base.study import Study, no_files
 from studies.base.table import Column, Row, each, hidden
 from workflow import solids
+from workflow.arguments import options, path_word
 
 ALL = "all"
 """Name that stands for every material in pooled tables."""
@@ -59,21 +58,14 @@ def error_columns(materials: Iterable[str]) -> list[Column]:
 
 @dataclass(frozen=True)
 class CaseStudy(Study):
-    """A study whose cases are measured by the command of its name, each into its own files.
-
-    Attributes
-    ----------
-    arguments
-        How every case is measured, of a configuration.
-    outputs
-        Files of a case: the command's options, and endings.
-    timed
-        Whether a case takes all cores, since its wall time counts.
-    """
+    """A study whose cases are measured by the command of its name, each into its own files."""
 
     arguments: Callable[[Mapping[str, Any]], list[str]] = no_files
+    """How every case is measured, of a configuration."""
     outputs: tuple[tuple[str, str], ...] = (("out", ".json"),)
+    """Files of a case: the command's options, and endings."""
     timed: bool = False
+    """Whether a case takes all cores, since its wall time counts."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -82,6 +74,13 @@ class CaseStudy(Study):
         object.__setattr__(
             self, "beside", lambda config: [f for each in others for f in each(config)]
         )
+
+
+def case_options(config: Mapping[str, Any], section: str, *keys: str, **others: str) -> list[str]:
+    """Options that every case of a study is measured with: its forest, and keys of its part."""
+    part = config[section]
+    forest = part["forest"] and path_word(part["forest"])
+    return options({"forest": forest, **{key: part[key] for key in keys}, **others})
 
 
 def cases_of(config: Mapping[str, Any], section: str) -> list[Case]:

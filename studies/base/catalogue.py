@@ -1,7 +1,5 @@
 """All studies that have a page: those of the folders in `studies`, the report, the validation."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib import import_module
 

@@ -1,7 +1,5 @@
 """Colours of figures, and of the pages that show them."""
 
-from __future__ import annotations
-
 import re
 
 INK, MUTED, FAINT = "#23211d", "#6f6a60", "#dedad1"

@@ -1,7 +1,5 @@
 """What the studies of forests share: where their results go, with which origin."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

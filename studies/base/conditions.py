@@ -1,10 +1,8 @@
 """Under which conditions the numbers of a table were measured."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any
 
 from studies.base.numbers import MISSING, show
@@ -38,55 +36,27 @@ NAMED = 3
 """Rows that are named where conditions differ; the others are counted."""
 
 
-@dataclass(frozen=True)
-class Conditions:
+class Conditions(dict[str, str]):
     """Where, when, with what and how often the numbers of a table were measured, in words.
 
-    Attributes
-    ----------
-    processor, compiled_for, vectors, cores, memory, ranks, threads, blas, versions, commit
-        Of the measurement; `cores` are those that the process could use, `compiled_for` is LLVM's
-        name of the processor. Where rows differ, each value is followed by its rows.
-    configuration
-        Hash of the resolved configuration, whatever the folders.
-    runs, spread
-        How often every number was measured, and how its spread is told.
-    date
-        Day of the measurement (UTC), or first and last day.
-    differing
-        Which of the above are not the same for all rows; empty if all are.
+    By the keys of `LABELS`: `cores` are those that the process could use, `compiled_for` is LLVM's
+    name of the processor, `configuration` the hash of the resolved one whatever the folders,
+    `differing` names those that are not the same for all rows, whose values are followed by theirs.
     """
-
-    processor: str
-    compiled_for: str
-    vectors: str
-    cores: str
-    memory: str
-    ranks: str
-    threads: str
-    blas: str
-    versions: str
-    commit: str
-    configuration: str
-    runs: str
-    spread: str
-    date: str
-    differing: str = ""
 
     @property
     def texts(self) -> dict[str, str]:
         """Conditions by key, without `differing` where nothing differs."""
-        return {key: text for key, text in asdict(self).items() if text}
+        return {key: text for key, text in self.items() if text}
 
     @property
     def headline(self) -> str:
         """Machine, ranks, runs and date in one line."""
-        warning = f"; not the same for all rows: {self.differing}" if self.differing else ""
+        warning = "; not the same for all rows: {differing}" if self["differing"] else ""
         return (
-            f"{self.processor} ({self.compiled_for}, vectors of {self.vectors}), {self.cores} "
-            f"cores, {self.memory}; ranks {self.ranks}, threads {self.threads}; runs "
-            f"{self.runs}; {self.date}{warning}"
-        )
+            "{processor} ({compiled_for}, vectors of {vectors}), {cores} cores, {memory}; ranks "
+            f"{{ranks}}, threads {{threads}}; runs {{runs}}; {{date}}{warning}"
+        ).format(**self)
 
     def as_markdown(self) -> str:
         """All conditions as a paragraph."""
@@ -127,18 +97,16 @@ def conditions(
     keys = list(next(iter(texts_by_row.values())))
     values = {key: {name: texts[key] for name, texts in texts_by_row.items()} for key in keys}
     differing = [key for key in keys if key not in said and len(set(values[key].values())) > 1]
-    joined = {key: _joined(values[key]) for key in keys}
-    return Conditions(
-        **joined
-        | {
-            "configuration": settings.config_hash(config),
-            "runs": repeats.runs,
-            "spread": repeats.spread,
-            "date": _days(records),
-            "differing": ", ".join(differing),
-        }
-        | said
-    )
+    texts = {
+        **{key: _joined(by_row) for key, by_row in values.items()},
+        "configuration": settings.config_hash(config),
+        "runs": repeats.runs,
+        "spread": repeats.spread,
+        "date": _days(records),
+        "differing": ", ".join(differing),
+        **said,
+    }
+    return Conditions({key: texts[key] for key in LABELS})
 
 
 def measured(
@@ -157,11 +125,9 @@ def measured(
 
 def read_conditions(texts: Mapping[str, str]) -> Conditions | None:
     """Conditions from a table's file; None if it tells none."""
-    names = [field.name for field in fields(Conditions)]
-    known = {name: texts[name] for name in names if name in texts}
-    if not known:
-        return None
-    return replace(Conditions(*[MISSING] * (len(names) - 1)), **known)
+    known = {name: texts[name] for name in LABELS if name in texts}
+    unknown = {**dict.fromkeys(LABELS, MISSING), "differing": ""}
+    return Conditions({**unknown, **known}) if known else None
 
 
 def versions_of(record: Record) -> str:
@@ -171,7 +137,6 @@ def versions_of(record: Record) -> str:
 
 
 def _texts(record: Record) -> dict[str, str]:
-    """What a record tells, in words."""
     return {
         **{key: str(record.get(key, MISSING)) for key in TOLD},
         "vectors": f"{record['vector_bits']} bits" if "vector_bits" in record else MISSING,

@@ -1,7 +1,5 @@
 """Pictures and sounds that a page carries within itself."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path

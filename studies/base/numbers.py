@@ -1,7 +1,5 @@
 """Numbers as people read them: few digits, units beside, powers of ten spelt as such."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

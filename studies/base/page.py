@@ -4,8 +4,6 @@ A study's function `page(results, tables)` returns a `StudyPage`, whose sections
 parts in `studies.base.parts`. All pages have the one template beside this file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -40,35 +38,28 @@ class Section(NamedTuple):
     menu: str = ""
 
 
-def section(id: str, title: str, *parts: Any, menu: str = "") -> Section:
-    """A section of parts, of which those that are empty do not count."""
-    return Section(id, title, together(*parts), menu)
+def section(title: str, *parts: Any, id: str = "", menu: str = "") -> Section:
+    """A section of parts, without those that are empty; its anchor is its entry in the menu."""
+    return Section(id or (menu or title).lower(), title, together(*parts), menu)
 
 
 def origins(table: Table, config: str = "config.yaml in the folder above this page") -> Section:
     """The last section: machines, commands, and where the configuration lies."""
-    return section("provenance", "Provenance", machine(table, config))
+    return section("Provenance", machine(table, config))
 
 
 @dataclass(frozen=True)
 class StudyPage:
-    """A page.
-
-    Attributes
-    ----------
-    title, kicker, lede
-        Heading, the words above it, the paragraph below it.
-    sections
-        In their order; those that are None are left out.
-    footer
-        Last paragraph.
-    """
+    """A page."""
 
     title: str
     kicker: str
     lede: str
+    """Heading, the words above it, the paragraph below it."""
     sections: Iterable[Section | None]
+    """In their order; those that are None are left out."""
     footer: str = FOOTER
+    """Last paragraph."""
 
     def __str__(self) -> str:
         """The page as HTML."""

@@ -3,8 +3,6 @@
 It is short for `snakemake -s $(carillon rules) --cores all NAME ...`, run in the present folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 Text that is no `Markup` is escaped wherever it goes in.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import pairwise
@@ -99,18 +97,20 @@ def facts(*items: Any) -> Markup:
     return element("p", *spans, class_="facts")
 
 
-def tile(figure: Any, text: Any, style: str = "") -> Markup:
-    """A number in large letters above what it means."""
+def _tile(values: Mapping[str, Any], figure: str, text: str, style: str = "") -> Markup:
+    number, meaning = (
+        part if isinstance(part, Markup) else html(part, **values) for part in (figure, text)
+    )
     return div(
         f"tile {style}".strip(),
-        element("p", figure, class_="figure"),
-        element("p", text, class_="what"),
+        element("p", number, class_="figure"),
+        element("p", meaning, class_="what"),
     )
 
 
-def tiles(*items: tuple[Any, ...], style: str = "") -> Markup:
-    """Tiles side by side, each the arguments of `tile`."""
-    return div(f"tiles {style}".strip(), *(tile(*item) for item in items))
+def tiles(*items: tuple[str, ...], style: str = "", **values: Any) -> Markup:
+    """Tiles side by side: a number in large letters, what it means, a style; see `html`."""
+    return div(f"tiles {style}".strip(), *(_tile(values, *item) for item in items))
 
 
 def styled(style: str, text: str) -> Markup:
@@ -241,7 +241,6 @@ def _cell(row: Row, column: Column, judged: Container[str]) -> Markup:
 
 
 def _conditions(measured: Conditions) -> Markup:
-    """Under which conditions a table was measured: one line, and all when it is opened."""
     lines = definitions((LABELS[key], text) for key, text in measured.texts.items())
     return element("details", element("summary", measured.headline), lines, class_="conditions")
 
@@ -271,7 +270,6 @@ def machine(table: Table, config: str) -> Markup:
 
 
 def _each(table: Table, key: str) -> list[Any]:
-    """Different values of a column."""
     return list(dict.fromkeys(row.get(key) for row in table.rows))
 
 

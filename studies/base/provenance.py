@@ -1,7 +1,5 @@
 """The table of where results come from."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Where a study keeps its results, and how they are read."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,22 +18,15 @@ from workflow import pinned_meshes, solids
 
 @dataclass(frozen=True)
 class Results:
-    """The folder of a study; files are read when asked for.
-
-    Attributes
-    ----------
-    folder
-        It, or the one above, holds the run's `config.yaml`.
-    section
-        Of the configuration that holds the study's `models`; all of it if empty.
-    measures
-        Where the configuration names the solids that the study measures, by the file of the result:
-        methods, convergence, scaling.
-    """
+    """The folder of a study; files are read when asked for."""
 
     folder: Path
+    """It, or the one above, holds the run's `config.yaml`."""
     section: ClassVar[str] = ""
+    """Of the configuration that holds the study's `models`; all of it if empty."""
     measures: ClassVar[Mapping[str, str]] = {}
+    """Where the configuration names the solids that the study measures, by the file of the result:
+    methods, convergence, scaling."""
 
     @cached_property
     def config(self) -> dict[str, Any]:

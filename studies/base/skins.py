@@ -1,7 +1,5 @@
 """Finite cells are drawn as what they are: the surface itself, which moves with them."""
 
-from __future__ import annotations
-
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree

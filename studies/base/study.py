@@ -1,7 +1,5 @@
 """A study: results in a folder of their own, tables and figures made of them, and a page."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -28,24 +26,16 @@ def no_files(config: Config) -> list[str]:
 
 @dataclass(frozen=True)
 class Figure:
-    """How a figure is made.
-
-    Attributes
-    ----------
-    file
-        Name below the folder of the figures without ending; it may hold one wildcard.
-    draw
-        Function `MODULE:NAME` of the results and the wildcard's value, see `Study.named`.
-    needs
-        File below the folder of the study that it is drawn from.
-    of
-        Where the configuration has the values of the wildcard, keys joined by dots.
-    """
+    """How a figure is made."""
 
     file: str
+    """Name below the folder of the figures without ending; it may hold one wildcard."""
     draw: str
+    """Function `MODULE:NAME` of the results and the wildcard's value, see `Study.named`."""
     needs: str
+    """File below the folder of the study that it is drawn from."""
     of: str = ""
+    """Where the configuration has the values of the wildcard, keys joined by dots."""
 
     @property
     def name(self) -> str:
@@ -63,53 +53,36 @@ class Figure:
 
 @dataclass(frozen=True)
 class Study:
-    """A study; what does its work is named by module, and loaded when it is asked for.
-
-    Attributes
-    ----------
-    name
-        Of the study and, but for the report of a run, of the target that makes it.
-    title
-        What the page is about, for lists of pages.
-    results
-        Class `MODULE:NAME` of the results, which takes their folder, see `Study.named`.
-    tables
-        Names of its tables in their order; the module `tabulated` has them, with `_` for `-`, but
-        for `provenance`, which all studies share.
-    package
-        That its modules are in, the one of its name below `studies` unless said.
-    folder
-        Below that of the run, of its own name unless said.
-    page, tabulated
-        Function `MODULE:NAME` of results and tables that returns the page; module of the tables.
-    file
-        The page below the folder; it may hold one wildcard.
-    prefix
-        What the files of its tables begin with, that of its results.
-    target
-        Whether a target of its name makes the page, and nothing else.
-    figures
-        All figures.
-    measured
-        Files that the tables are made from.
-    beside
-        Files that the page shows beside tables and figures.
-    """
+    """A study; what does its work is named by module, and loaded when it is asked for."""
 
     name: str
+    """Of the study and, but for the report of a run, of the target that makes it."""
     title: str
+    """What the page is about, for lists of pages."""
     results: str
+    """Class `MODULE:NAME` of the results, which takes their folder, see `Study.named`."""
     tables: tuple[str, ...]
+    """Names of its tables in their order; the module `tabulated` has them, with `_` for `-`, but
+    for `provenance`, which all studies share."""
     package: str = ""
+    """That its modules are in, the one of its name below `studies` unless said."""
     folder: str | None = None
+    """Below that of the run, of its own name unless said."""
     page: str = "page:page"
     tabulated: str = "tables"
+    """Function `MODULE:NAME` of results and tables that returns the page; module of the tables."""
     file: str = "report.html"
+    """The page below the folder; it may hold one wildcard."""
     prefix: str = ""
+    """What the files of its tables begin with, that of its results."""
     target: bool = True
+    """Whether a target of its name makes the page, and nothing else."""
     figures: tuple[Figure, ...] = ()
+    """All figures."""
     measured: Files = no_files
+    """Files that the tables are made from."""
     beside: Files = no_files
+    """Files that the page shows beside tables and figures."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "package", self.package or f"studies.{self.name}")

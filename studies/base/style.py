@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
-from matplotlib.axis import Axis
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, PercentFormatter
 
 from carillon.files.atomic import atomic_path
 from studies.base.colours import FAINT, INK, MUTED
@@ -62,11 +61,13 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def plain_numbers(axis: Axis) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5 of every decade, as plain numbers."""
-    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
+def logarithmic(*shown: Any, percent: bool = False) -> None:
+    """Make axes logarithmic, ticks at 1, 2 and 5 of every decade as plain numbers or per cent."""
+    for axis in shown:
+        axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+        axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(PercentFormatter(1.0) if percent else "{x:g}")
+        axis.set_minor_formatter(NullFormatter())
 
 
 def named_rows(axes: Any, names: Sequence[str]) -> None:

@@ -7,8 +7,6 @@ columns `NAME_min` and `NAME_max` hold the spread of the column `NAME`; a column
 of what kind the values of `NAME` are, row by row.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -36,30 +34,20 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
-
-    Attributes
-    ----------
-    key
-        Name in the rows and in the CSV file.
-    label
-        Head for people.
-    kind
-        How values are formatted, see `studies.base.numbers.show`.
-    unit
-        Unit of the raw value, written into the CSV's head; that of the kind if empty.
-    shown
-        Whether people see the column; programs always do.
-    source
-        Where the value lies in what a table is made from, names joined by dots; the key if empty.
-    """
+    """One column."""
 
     key: str
+    """Name in the rows and in the CSV file."""
     label: str
+    """Head for people."""
     kind: str = "text"
+    """How values are formatted, see `studies.base.numbers.show`."""
     unit: str = ""
+    """Unit of the raw value, written into the CSV's head; that of the kind if empty."""
     shown: bool = True
+    """Whether people see the column; programs always do."""
     source: str = field(default="", compare=False)
+    """Where the value lies in what a table is made from, names joined by dots; the key if empty."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", self.unit or UNITS.get(self.kind, ""))
@@ -113,28 +101,19 @@ def each(names: Iterable[str] | Mapping[str, str], *columns: Column) -> list[Col
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of raw values with what is needed to show them.
-
-    Attributes
-    ----------
-    name
-        File name without ending.
-    caption
-        What the table shows, over which modes, against which base.
-    columns, rows
-        The rows are dictionaries by column key; a missing key is a missing value.
-    keys
-        Columns that tell the rows apart; the first one if empty.
-    conditions
-        Under which the numbers were measured; None if nothing says so.
-    """
+    """Rows of raw values with what is needed to show them."""
 
     name: str
+    """File name without ending."""
     caption: str
+    """What the table shows, over which modes, against which base."""
     columns: list[Column]
     rows: list[Row] = field(default_factory=list)
+    """The rows are dictionaries by column key; a missing key is a missing value."""
     keys: list[str] = field(default_factory=list)
+    """Columns that tell the rows apart; the first one if empty."""
     conditions: Conditions | None = None
+    """Under which the numbers were measured; None if nothing says so."""
 
     @property
     def shown(self) -> list[Column]:
@@ -271,21 +250,17 @@ def _value(row: Any, source: str) -> Any:
 
 def write_table(table: Table, folder: str | Path) -> None:
     """Write `table` to `folder` as CSV, Markdown and, for the report, JSON."""
+    content = asdict(table)
+    for column in content["columns"]:
+        del column["source"]
     contents = {
         "csv": table.as_csv(),
         "md": table.as_markdown(),
-        "json": json.dumps(_as_json(table), indent=1),
+        "json": json.dumps(content, indent=1),
     }
     for ending, text in contents.items():
         with atomic_path(Path(folder) / f"{table.name}.{ending}") as temporary:
             temporary.write_text(text)
-
-
-def _as_json(table: Table) -> dict[str, Any]:
-    content = asdict(table)
-    for column in content["columns"]:
-        del column["source"]
-    return content
 
 
 def read_table(path: str | Path) -> Table:

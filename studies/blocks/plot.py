@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from carillon.command_line.outputs import require_plottable
 from carillon.files.atomic import atomic_path
 from studies.base.colours import COLOURS, MUTED
-from studies.base.style import plain_numbers
+from studies.base.style import logarithmic
 from studies.base.table import Row
 from workflow.report.blocks_tables import compared, kind_of, kinds_of, method_of
 
@@ -90,5 +90,5 @@ def _panel(axis: Any, rows: Sequence[Row], marks: dict[str, tuple[str, str]]) ->
         )
     least = rows[0]["min_mean_error"]
     axis.axhline(least, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="least of any")
-    axis.set(xscale="log", yscale="log")
-    plain_numbers(axis.yaxis)
+    axis.set_xscale("log")
+    logarithmic(axis.yaxis)

@@ -1,7 +1,5 @@
 """Tables of errors on single blocks."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 from studies.forests.study import FORESTS
@@ -59,7 +57,7 @@ def test_kinds_of_blocks_are_columns_and_databases_one_row():
     assert (rows["average"]["kind0_nodal"], rows["average"]["kind1_nodal"]) == (0.5, 0.7)
     assert rows["average"]["seconds_per_block"] == 2e-6
     assert rows["average"]["seconds_per_block_min"] == 5e-7
-    assert table.conditions.runs.startswith("5 ")
+    assert table.conditions["runs"].startswith("5 ")
     assert rows["database"]["kind1_nodal"] == 0.5, "not that beyond its range"
     assert (rows["database"]["storage_bytes"], rows["database"]["training_seconds"]) == (200, 2.0)
     assert rows[LOWER_BOUND]["kind0_nodal"] == 0.4

@@ -1,7 +1,5 @@
 """The campaign as one page; pages of the cells lie below it."""
 
-from __future__ import annotations
-
 from typing import Any
 from urllib.parse import quote
 
@@ -10,6 +8,7 @@ from markupsafe import Markup
 from studies.base.page import StudyPage, origins, section
 from studies.base.parts import article, bullets, element, facts, grid, html, note, prose
 from studies.base.table import Table
+from studies.campaign.cells import Cell
 from studies.campaign.results import PASSED, Campaign, end_of
 
 
@@ -24,7 +23,7 @@ def page(study: Campaign, tables: dict[str, Table]) -> StudyPage:
         <span class="file">junit.xml</span> beside this page.""",
         **study.part | {"tolerance": study.config["solver"]["tolerance"]},
     )
-    cells = [_cell(study, row) for row in tables["cells"].rows]
+    cells = [_cell(study, *each) for each in zip(study.found, tables["cells"].rows)]
     judgement = f"judgement {'passed' if study.passed else 'failed'}"
     return StudyPage(
         title="Validation of solids, materials, seeds and ranks",
@@ -33,26 +32,20 @@ def page(study: Campaign, tables: dict[str, Table]) -> StudyPage:
             ranks. Where does a spectrum go wrong?""",
         sections=[
             section(
-                "verdict",
                 "Verdict",
                 element("p", study.headline, class_=judgement),
                 note(study.without),
                 prose(about),
                 grid(tables["solids"]),
             ),
-            section("cells", "Cells, the worst first", *cells, menu="Cells"),
-            section("table", "Table", grid(tables["cells"])),
+            section("Cells, the worst first", *cells, menu="Cells"),
+            section("Table", grid(tables["cells"])),
             origins(tables["provenance"]),
         ],
     )
 
 
-def _cell(study: Campaign, row: dict[str, Any]) -> Markup:
-    """What the page says of a cell."""
-    key = (row["model"], row["material"], row["seed"], row["ranks"])
-    cell = next(
-        each for each in study.found if (each.solid, each.material, each.seed, each.ranks) == key
-    )
+def _cell(study: Campaign, cell: Cell, row: dict[str, Any]) -> Markup:
     result = study.found[cell]
     passed = end_of(result) == PASSED
     led = ""

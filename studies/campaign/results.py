@@ -1,7 +1,5 @@
 """What a campaign has found, cell by cell."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Tables of the campaign: every cell, and the solids."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The campaign: what its cells are, how they are judged, and that a failed one stops no other."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The claims as one page."""
 
-from __future__ import annotations
-
 from studies.base.page import StudyPage, section
 from studies.base.parts import div, element, grid, html, picture_uri, prose, tiles
 from studies.base.table import Table
@@ -34,9 +32,8 @@ def page(claims: Claims, tables: dict[str, Table]) -> StudyPage:
             Design of 3D Model using Material Optimization</cite> (SCA 2016), what is measured
             here, and why it agrees or does not."""),
         sections=[
-            section("claims", "Claims", tiles(*counts), div("claims", grid(tables["claims"]))),
+            section("Claims", tiles(*counts), div("claims", grid(tables["claims"]))),
             section(
-                "solids",
                 "Fig. 11, solid by solid",
                 grid(tables["solids"]),
                 prose(
@@ -47,13 +44,12 @@ def page(claims: Claims, tables: dict[str, Table]) -> StudyPage:
                 menu="Solids",
             ),
             section(
-                "scene",
                 "A scene from fine and coarse modes (Fig. 13)",
                 picture,
                 grid(claims.scene) if claims.scene else "",
                 prose(led if claims.scene else none),
                 menu="Scene",
             ),
-            section("sources", "Sources", grid(tables["sources"])),
+            section("Sources", grid(tables["sources"])),
         ],
     )

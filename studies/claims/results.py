@@ -1,7 +1,5 @@
 """Tables that claims are measured by: those of the run, of the full figures, of the reference."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from functools import cached_property
@@ -56,7 +54,7 @@ class Claims(Results):
     def in_full(self, name: str) -> Table | None:
         """A table of the full figures: this run's, else the reference's; None without either."""
         own = self.run / FULL / "tables" / f"{name}.json"
-        kept = reference() / FULL / "tables" / f"{name}.csv"
+        kept = settings.FOLDER.parent / REFERENCE / FULL / "tables" / f"{name}.csv"
         return next((self._table(path) for path in (own, kept) if path.is_file()), None)
 
     @cached_property
@@ -99,8 +97,3 @@ class Claims(Results):
         if name not in self.read:
             self.read[name] = read_table(path) if path.suffix == ".json" else read_csv_table(path)
         return self.read[name]
-
-
-def reference() -> Path:
-    """Folder of the reference."""
-    return settings.FOLDER.parent / REFERENCE

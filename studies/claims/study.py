@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from studies.base.study import Config, Study

@@ -1,7 +1,5 @@
 """The table of claims, and the one of files that its figures are from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -60,23 +58,14 @@ def claims(results: Claims) -> Iterator[Row]:
 def printed(paper: dict[str, Any]) -> dict[str, Any]:
     """What the texts of claims say of the paper's numbers."""
     times = paper["times"].values()
-    ratios = {
-        name: [row["arpack"] / row[name] for row in times] for name in ("all", "ddfem", "hcms_ec")
-    }
-    alone = [row["all"] for row in times]
+    values = {"all_": [row["all"] for row in times]}
+    for name, prefix in {"all": "", "ddfem": "ddfem_", "hcms_ec": "hcms_ec_"}.items():
+        values[prefix] = [row["arpack"] / row[name] for row in times]
+    ends = {"least": min, "most": max}
     return {
         "paper": paper["blocks"],
         "factor": paper["blocks"]["average"]["error"] / paper["blocks"]["forests"]["error"],
-        "times": {
-            "least": min(ratios["all"]),
-            "most": max(ratios["all"]),
-            "ddfem_least": min(ratios["ddfem"]),
-            "ddfem_most": max(ratios["ddfem"]),
-            "hcms_ec_least": min(ratios["hcms_ec"]),
-            "hcms_ec_most": max(ratios["hcms_ec"]),
-            "all_least": min(alone),
-            "all_most": max(alone),
-        },
+        "times": {f"{of}{end}": f(values[of]) for of in values for end, f in ends.items()},
     }
 
 
@@ -86,13 +75,13 @@ def printed(paper: dict[str, Any]) -> dict[str, Any]:
     Column("paper_arpack", "ARPACK", "seconds"),
     Column("paper_all", "DDFEM* + HCMS + EC", "seconds"),
     Column("paper_ratio", "Speed-up", "times"),
-    Column("unknowns", "Here: unknowns", "count"),
+    Column("unknowns", "Here: unknowns", "count", source="dof_fine"),
     Column("slepc", "SLEPc", "seconds"),
-    Column("cold_seconds", "cold", "seconds"),
-    Column("warm_seconds", "warm", "seconds"),
+    Column("cold_seconds", "cold", "seconds", source="ddfem_ec"),
+    Column("warm_seconds", "warm", "seconds", source="ddfem_ec_warm"),
     Column("cold", "Speed-up, cold", "times"),
     Column("warm", "warm", "times"),
-    Column("error", "Frequencies, rms", "percent"),
+    Column("error", "Frequencies, rms", "percent", source="ddfem_error"),
     Column("note", "Note"),
 )
 def solids(results: Claims) -> Iterator[Row]:
@@ -109,30 +98,14 @@ def solids(results: Claims) -> Iterator[Row]:
             "paper_all": float(printed_row["all"]),
             "paper_ratio": printed_row["arpack"] / printed_row["all"],
             **({} if row is None else _measured(row)),
-            "note": _note(printed_row, row),
+            "note": "" if row else "not timed here" if "here" in printed_row else NO_MESH,
         }
 
 
-def _note(printed_row: Row, row: Row | None) -> str:
-    """Why there are no times of a solid; empty if there are."""
-    if row is not None:
-        return ""
-    return "not timed here" if "here" in printed_row else NO_MESH
-
-
 def _measured(row: Row) -> Row:
-    """What was measured of a solid."""
-    cold, warm = row.get("ddfem_ec"), row.get("ddfem_ec_warm")
-    slepc = row["slepc"]
-    return {
-        "unknowns": row["dof_fine"],
-        "slepc": slepc,
-        "cold_seconds": cold,
-        "warm_seconds": warm,
-        "cold": slepc / cold if cold else None,
-        "warm": slepc / warm if warm else None,
-        "error": row.get("ddfem_error"),
-    }
+    row = dict.fromkeys(("ddfem_ec", "ddfem_ec_warm", "ddfem_error")) | row
+    times = {"cold": row["ddfem_ec"], "warm": row["ddfem_ec_warm"]}
+    return row | {key: row["slepc"] / time if time else None for key, time in times.items()}
 
 
 @table(
@@ -146,25 +119,15 @@ def sources(results: Claims) -> Iterator[Row]:
     """Files that the figures above are read from, below the folder of this run or of the
     checkout."""
     for name in dict.fromkeys(results.read):
+        row = {"file": name, "command": _command(name), "commit": None, "date": None}
         conditions = results.read[name].conditions
-        yield {
-            "file": name,
-            "command": _command(name),
-            "commit": conditions.commit if conditions else None,
-            "date": conditions.date if conditions else None,
-            "machine": f"{conditions.processor} ({conditions.compiled_for})"
-            if conditions
-            else None,
-        }
+        machine = conditions and "{processor} ({compiled_for})".format(**conditions)
+        yield {**row, **(conditions or {}), "machine": machine}
     for name, row in results.kept.items():
         record = row["provenance"]
-        yield {
-            "file": f"{MEASURED.name}: {name}",
-            "command": record["command"],
-            "commit": record["commit"],
-            "date": record["date"][:10],
-            "machine": f"{record['processor']} ({record['compiled_for']})",
-        }
+        machine = f"{record['processor']} ({record['compiled_for']})"
+        about = {"file": f"{MEASURED.name}: {name}", "date": record["date"][:10]}
+        yield {**record, **about, "machine": machine}
 
 
 def _command(name: str) -> str:

@@ -1,7 +1,5 @@
 """The paper's claims: every one is measured, and verdicts follow from the tables."""
 
-from __future__ import annotations
-
 import pytest
 import yaml
 

@@ -1,9 +1,8 @@
 """The study of the worst modes as one page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from markupsafe import Markup
 
@@ -21,14 +20,14 @@ Tables = dict[str, Table]
 def page(study: CoarseningStudy, tables: Tables) -> StudyPage:
     """Build the page from the tables, figures and pictures of a study; nothing is computed anew."""
     plain, refined = tables["summary"].rows
-    say = partial(
-        html,
-        plain=plain,
-        refined=refined,
-        goals=study.goals,
-        span=f"7–{study.last}",
-        correlation=rank_correlation(study),
-    )
+    values: dict[str, Any] = {
+        "plain": plain,
+        "refined": refined,
+        "goals": study.goals,
+        "span": f"7–{study.last}",
+        "correlation": rank_correlation(study),
+    }
+    say = partial(html, **values)
     solids = [solid for solid in study.solids if study.worst_of(solid) is not None]
     left = tables["modes"].having({"of": LABELS["refined"]})
     far_off = say(
@@ -37,32 +36,32 @@ def page(study: CoarseningStudy, tables: Tables) -> StudyPage:
         else "No mode of the refined models is more than {goals[far_off]:percent} off."
     )
     verdict = section(
-        "verdict",
         "Verdict",
         parts.tiles(
             (
-                say("{plain[all_rms]:percent}"),
-                say("""rms error of the <b>coarse</b> models over modes {span};
-                    worst {plain[all_worst]:percent}: {plain[all_where]}"""),
+                "{plain[all_rms]:percent}",
+                """rms error of the <b>coarse</b> models over modes {span};
+                    worst {plain[all_worst]:percent}: {plain[all_where]}""",
                 "ddfem_hcms_ec",
             ),
             (
-                say("{refined[all_rms]:percent}"),
-                say("""of the <b>refined</b> ones; worst {refined[all_worst]:percent}:
-                    {refined[all_where]}"""),
+                "{refined[all_rms]:percent}",
+                """of the <b>refined</b> ones; worst {refined[all_worst]:percent}:
+                    {refined[all_where]}""",
                 "hcms_ec",
             ),
             (
-                say("{plain[far_off]:count}"),
-                say("""modes are more than {goals[far_off]:percent} off in the coarse models,
+                "{plain[far_off]:count}",
+                """modes are more than {goals[far_off]:percent} off in the coarse models,
                     <b>{refined[far_off]:count}</b> in the refined ones; {plain[swap]} are there
-                    under another number, {plain[local]} are local"""),
+                    under another number, {plain[local]} are local""",
             ),
             (
-                say("{correlation:score}"),
-                say("<b>rank correlation</b> of expected and true rms errors over all cases"),
+                "{correlation:score}",
+                "<b>rank correlation</b> of expected and true rms errors over all cases",
                 "proof",
             ),
+            **values,
         ),
         parts.note(study.without),
         prose(
@@ -92,27 +91,25 @@ def page(study: CoarseningStudy, tables: Tables) -> StudyPage:
         sections=[
             verdict,
             section(
-                "cases",
                 "Cases",
                 grid(tables["cases"], by="title"),
                 plot(study.drawn("errors"), errors, "errors"),
                 plot(study.drawn("expected"), expected, "expected", "narrow"),
             ),
             section(
-                "solids",
                 "Modes far off",
                 *(_solid(study, tables, solid, first=solid == solids[0]) for solid in solids),
+                id="solids",
             )
             if solids
             else None,
             section(
-                "left",
                 "After refinement",
                 prose(far_off),
                 grid(_with_titles(tables["modes"]), left, ("of",), by="title") if left else "",
+                id="left",
             ),
             section(
-                "evidence",
                 "Evidence",
                 grid(tables["truths"], by="title"),
                 prose(_speeds(study)),
@@ -138,7 +135,6 @@ def _speeds(study: CoarseningStudy) -> Markup:
 
 
 def _solid(study: CoarseningStudy, tables: Tables, solid: str, first: bool) -> Markup:
-    """What the page says of a solid that has modes which are far off."""
     worst = study.worst_of(solid)
     assert worst is not None
     case, mode = worst

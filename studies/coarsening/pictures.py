@@ -56,7 +56,6 @@ def best_view(mesh: HexMesh, energy: Array, up: str) -> tuple[float, float]:
 
 
 def _seen(mesh: HexMesh, view: tuple[float, float], up: str) -> Index:
-    """Cells that no other one hides, told by their middles."""
     eye = looks_at(mesh, np.eye(3), view, up)
     across = np.linalg.svd(eye[None])[2][1:]
     nearest_first = np.argsort(-(mesh.grid @ eye), kind="stable")

@@ -1,15 +1,12 @@
 """Figures of the study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 
 from studies.base.colours import COLOURS, MUTED
-from studies.base.style import named_rows, plain_numbers
+from studies.base.style import logarithmic, named_rows
 from studies.coarsening.results import MODELS, CoarseningStudy
 
 COLOUR = {"plain": COLOURS["ddfem_hcms_ec"], "refined": COLOURS["hcms_ec"]}
@@ -45,8 +42,7 @@ def expected_figure(study: CoarseningStudy) -> Figure:
             )
     ends = (0.7 * min(drawn), 1.4 * max(drawn))
     axes.plot(ends, ends, color=MUTED, linewidth=0.9, zorder=0)
-    _logarithmic(axes.xaxis)
-    _logarithmic(axes.yaxis)
+    logarithmic(axes.xaxis, axes.yaxis, percent=True)
     axes.set(xlim=ends, ylim=ends, xlabel="expected rms error", ylabel="true rms error")
     figure.legend(loc="outside upper left", ncols=2, columnspacing=1.0, handletextpad=0.1)
     return figure
@@ -66,7 +62,7 @@ def errors_figure(study: CoarseningStudy) -> Figure:
             places = [place + shift for place in range(len(rows))]
             label = f"{LABEL[model]}, {key}"
             axes.plot(values, places, marker, color=COLOUR[model], markersize=size, label=label)
-    _logarithmic(axes.xaxis)
+    logarithmic(axes.xaxis, percent=True)
     named_rows(axes, names)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xlabel("frequency error")
@@ -81,9 +77,3 @@ def _name(row: dict[str, Any], with_resolution: bool) -> str:
 
 def _drawn(error: float) -> float:
     return max(abs(error), SMALLEST)
-
-
-def _logarithmic(axis: Any) -> None:
-    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
-    plain_numbers(axis)
-    axis.set_major_formatter(PercentFormatter(1.0))

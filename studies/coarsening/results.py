@@ -1,7 +1,5 @@
 """What the study of the worst modes has found."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

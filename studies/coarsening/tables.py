@@ -1,7 +1,5 @@
 """Tables of the study: errors of every case, modes that are far off, elements to blame."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

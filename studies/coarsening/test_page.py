@@ -1,7 +1,5 @@
 """The study of the worst modes: pooling, verdicts, the worst of a solid, a miniature end to end."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -16,8 +14,8 @@ from studies.coarsening.results import CoarseningStudy
 from studies.coarsening.study import COARSENING
 from studies.coarsening.tables import filled_cells, rank_correlation, speeds
 from tests import solids
-from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import LAPTOP, PROFILE, TINY, snakemake
+from tests.pages import finished_page
+from tests.workflow_runs import LAPTOP, finished
 from workflow import settings
 
 summary, cases, modes, elements, costs = (
@@ -169,36 +167,23 @@ def test_a_mode_is_seen_from_where_its_energy_is(side):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def miniature(tmp_path_factory):
     """Folder of the tiny study."""
-    folder = tmp_path_factory.mktemp("study")
-    done = snakemake(folder, "--profile", PROFILE, "coarsening", "--configfile", TINY)
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
-    return folder / "results-tiny" / "coarsening"
+    return finished(tmp_path_factory.mktemp("study"), "coarsening") / "results-tiny/coarsening"
 
 
 @pytest.mark.nightly
-def test_the_page_of_a_miniature_study_holds_its_tables(finished):
-    page = Page(finished / "report.html")
-    assert_self_contained(page)
-    assert {"model-dumbbell", "plot-errors", "plot-expected"} <= set(page.ids)
-    for name in ("summary", "cases", "truths", "costs", "provenance"):
-        assert_same_numbers(page, finished / "tables", name)
-    assert (finished / "report.html").read_text().count("data:image/png") == 2
-    for name in ("errors", "expected"):
-        assert (finished / "figures" / f"{name}.png").stat().st_size > 5000
+def test_the_page_of_a_miniature_study_holds_its_tables(miniature):
+    shown = ("summary", "cases", "truths", "costs", "provenance")
+    page = finished_page(COARSENING, miniature, shown)
+    assert "model-dumbbell" in page.ids and page.source.count("data:image/png") == 2
 
 
 @pytest.mark.nightly
-def test_a_miniature_study_is_refined_to_its_goals(finished):
-    plain, refined = read_table(finished / "tables/summary.json").rows
+def test_a_miniature_study_is_refined_to_its_goals(miniature):
+    plain, refined = read_table(miniature / "tables/summary.json").rows
     assert refined["all_rms"] <= 0.05 < plain["all_rms"]
     assert refined["met"] == refined["cases"] == 2 and plain["far_off"] > 0
-    for row in read_table(finished / "tables/truths.json").rows:
-        expected, counted = row["inertia"].split(" / ")
-        assert expected == counted
-    for row in read_table(finished / "tables/provenance.json").rows:
-        assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]
-    for case in (finished / "cases" / "dumbbell").glob("*.json"):
+    for case in (miniature / "cases" / "dumbbell").glob("*.json"):
         content = json.loads(case.read_text())
         assert (content["resolution"], content["modes"], content["coarsen"]) == (12, 24, "ddfem")

@@ -20,31 +20,22 @@ SIDES = ("before", "now")
 
 @dataclass(frozen=True)
 class Comparison:
-    """Everything that two folders have in common, and what only one of them has.
-
-    Attributes
-    ----------
-    before, now
-        The baseline and the other folder.
-    cells
-        Values of both: `KEYS`, `label` for people, `kind`, those of both `SIDES` with their `ENDS`
-        and `SHOWN`, the `ratio` of both where that says something, and the `verdict`.
-    moved
-        Values that are not the same any more, the worst first.
-    conditions, configuration
-        What differs of them.
-    only_before, only_now
-        Tables, rows and columns of one folder alone, in words.
-    """
+    """Everything that two folders have in common, and what only one of them has."""
 
     before: Folder
     now: Folder
+    """The baseline and the other folder."""
     cells: pd.DataFrame
+    """Values of both: `KEYS`, `label` for people, `kind`, those of both `SIDES` with their `ENDS`
+    and `SHOWN`, the `ratio` of both where that says something, and the `verdict`."""
     moved: pd.DataFrame
+    """Values that are not the same any more, the worst first."""
     conditions: list[Difference]
     configuration: list[Difference]
+    """What differs of them."""
     only_before: list[str]
     only_now: list[str]
+    """Tables, rows and columns of one folder alone, in words."""
 
 
 def compare(before: Folder, now: Folder) -> Comparison:
@@ -66,7 +57,6 @@ def compare(before: Folder, now: Folder) -> Comparison:
 
 
 def _cells(folder: Folder, side: str) -> pd.DataFrame:
-    """All values of a folder that are compared, in columns of a side."""
     tables = [each for each in folder.tables.items() if not each[0].endswith(APART)]
     columns = [*KEYS, "label", "kind", *(f"{side}{end}" for end in (*ENDS, SHOWN))]
     cells = [cell for each in tables for cell in cells_of(*each)]
@@ -82,7 +72,6 @@ def _ratio(before: Value, now: Value) -> float | None:
 
 
 def _only(here: Folder, there: Folder) -> Iterator[str]:
-    """Tables, rows and columns that one folder has and the other has not."""
     yield from (f"table {path}" for path in here.tables if path not in there.tables)
     for path, table in here.tables.items():
         if path in there.tables and not path.endswith(APART):

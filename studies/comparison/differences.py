@@ -34,7 +34,7 @@ def of_configurations(before: Folder, now: Folder) -> list[Difference]:
 
 def dates(folder: Folder) -> str:
     """First and last day on which tables of a folder were measured."""
-    spans = [table.conditions.date for table in folder.tables.values() if table.conditions]
+    spans = [table.conditions["date"] for table in folder.tables.values() if table.conditions]
     days = sorted({day for text in spans for day in text.split(" to ") if day != MISSING})
     return " to ".join(dict.fromkeys([days[0], days[-1]])) if days else MISSING
 

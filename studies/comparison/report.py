@@ -1,7 +1,5 @@
 """A comparison as files: Markdown and a page for people, CSV and JSON for programs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -121,15 +119,13 @@ def as_page(comparison: Comparison) -> StudyPage:
         lede=f"{summary(comparison)}.",
         sections=[
             section(
-                "conditions",
                 "Conditions",
                 prose(_sides(comparison)),
                 *(differing or [same]),
                 *map(prose, _caution(comparison)),
             ),
-            section("moved", "Moved", *(moved or [prose("Nothing moved beyond noise.")])),
+            section("Moved", *(moved or [prose("Nothing moved beyond noise.")])),
             section(
-                "tables",
                 "By table",
                 grid(counted, caption=False),
                 prose(counted.caption),
@@ -138,10 +134,10 @@ def as_page(comparison: Comparison) -> StudyPage:
                     for each in tables
                 ),
                 prose(unlisted and html("Too long for this page: {}, {}.", unlisted, all_of_them)),
+                id="tables",
             ),
-            section("only", "On one side", div("prose", *only)) if one_sided else None,
+            section("On one side", div("prose", *only), id="only") if one_sided else None,
             section(
-                "rules",
                 "Rules",
                 prose(
                     """A number counts as moved when it differs by more than noise. What that is
@@ -204,7 +200,6 @@ def counts(cells: pd.DataFrame) -> list[Row]:
 
 
 def _differing_table(name: str, what: str, differences: list[Difference], apart: bool) -> Table:
-    """What is not the same, and for which tables where `apart`."""
     columns = [Column("what", what), Column("before", "Baseline"), Column("now", "This run")]
     columns.append(Column("where", "Tables", shown=apart))
     rows = [{**each, "where": each["where"] or "all"} for each in differences]
@@ -247,7 +242,6 @@ def _differing(comparison: Comparison) -> list[Table]:
 
 
 def _one_sided(comparison: Comparison) -> dict[str, list[str]]:
-    """What one folder has alone, by words for it."""
     before, now = comparison.only_before, comparison.only_now
     sides = {"Only in the baseline": before, "Only in this run": now}
     return {side: only for side, only in sides.items() if only}

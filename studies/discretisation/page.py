@@ -1,7 +1,5 @@
 """The study of discretisations as one page."""
 
-from __future__ import annotations
-
 from studies.base.page import StudyPage, origins, section
 from studies.base.parts import grid, html, note, plot, prose, tiles
 from studies.base.table import Table
@@ -43,7 +41,6 @@ def page(study: DiscretisationStudy, tables: dict[str, Table]) -> StudyPage:
             spectrum come to the solid itself, with how many unknowns and in what time?""",
         sections=[
             section(
-                "verdict",
                 "Verdict",
                 tiles(
                     *((html("{solid_median:percent}", **row), html(NEAREST, **row)) for row in best)
@@ -53,12 +50,12 @@ def page(study: DiscretisationStudy, tables: dict[str, Table]) -> StudyPage:
                 grid(tables["summary"], by="material"),
             ),
             section(
-                "figures",
                 "At equal cost",
                 *(plot(study.drawn(name), text, name) for name, text in figures.items()),
+                id="figures",
             ),
-            section("cases", "Cases", grid(tables["cases"], by="material")),
-            section("truth", "Truth", prose(TRUTH), grid(tables["truths"], by="title")),
+            section("Cases", grid(tables["cases"], by="material")),
+            section("Truth", prose(TRUTH), grid(tables["truths"], by="title")),
             origins(tables["provenance"]),
         ],
     )

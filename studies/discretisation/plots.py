@@ -1,15 +1,12 @@
 """Figures of the study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 
 from studies.base.colours import COLOURS, INK
-from studies.base.style import plain, plain_numbers
+from studies.base.style import logarithmic, plain
 from studies.discretisation.results import DiscretisationStudy
 from studies.discretisation.tables import WAYS
 
@@ -58,10 +55,8 @@ def _errors_over(study: DiscretisationStudy, key: str, label: str) -> Figure:
                 colour = COLOUR[row["name"]]
                 axes.plot(row[key], error, marker[row["title"]], color=colour, markersize=4.5)
         axes.set_title(material)
-        axes.set(xscale="log", yscale="log")
-        plain_numbers(axes.xaxis)
-        plain_numbers(axes.yaxis)
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        logarithmic(axes.xaxis)
+        logarithmic(axes.yaxis, percent=True)
     for axes in panels[:, 0]:
         axes.set_ylabel("rms frequency error")
     for axes in panels[-1]:

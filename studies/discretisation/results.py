@@ -1,7 +1,5 @@
 """What the study of discretisations has found."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from studies.base.cases import Case, CaseResults

@@ -1,7 +1,5 @@
 """Tables of the study: errors by material, every case, and what is known of the truth."""
 
-from __future__ import annotations
-
 import statistics
 from collections.abc import Iterator
 

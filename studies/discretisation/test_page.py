@@ -1,7 +1,5 @@
 """The study of discretisations: pooling, what a case shows, the page, the rules."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -12,7 +10,7 @@ from studies.base.cases import cases_of
 from studies.discretisation.results import DiscretisationStudy
 from studies.discretisation.study import DISCRETISATION
 from studies.discretisation.tables import WAYS
-from tests.pages import assert_same_numbers, assert_self_contained, page_of
+from tests.pages import assert_holds, page_of
 
 summary, cases, truths = (DISCRETISATION.entries[name] for name in ("summary", "cases", "truths"))
 MODEL = {"title": "", "mesh": "builtin:fork", "resolutions": [8], "components": "error"}
@@ -83,10 +81,7 @@ def test_every_case_has_a_row_a_way(study):
 
 def test_the_page_holds_its_tables_and_figures(study):
     page = page_of(DISCRETISATION, study, study.folder / "report.html")
-    assert_self_contained(page)
-    assert {"plot-unknowns", "plot-seconds"} <= set(page.ids)
-    for name in DISCRETISATION.tables:
-        assert_same_numbers(page, study.folder / "tables", name)
+    assert_holds(page, DISCRETISATION, study.folder)
 
 
 def test_a_target_makes_the_study(plan):

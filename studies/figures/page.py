@@ -1,12 +1,18 @@
 """The figures as one page."""
 
-from __future__ import annotations
-
 from studies.base.page import StudyPage, origins, section
 from studies.base.parts import grid, plot, prose
+from studies.base.results import Results
 from studies.base.table import Table
-from studies.figures.results import Figures
+from studies.figures.study import MEASURES
 from workflow.report.page import convergence_plots, modelled, scaling_plots
+
+
+class Figures(Results):
+    """The folder of the figures; solids whose mesh does not exist are left out."""
+
+    section = "figures"
+    measures = MEASURES
 
 
 def page(figures: Figures, tables: dict[str, Table]) -> StudyPage:
@@ -19,7 +25,6 @@ def page(figures: Figures, tables: dict[str, Table]) -> StudyPage:
             from which start; and how the solver scales over ranks.""",
         sections=[
             section(
-                "times",
                 "Times",
                 prose(figures.without),
                 grid(tables["methods"]),
@@ -27,16 +32,16 @@ def page(figures: Figures, tables: dict[str, Table]) -> StudyPage:
                 grid(tables["ratios"], by="model"),
                 grid(tables["spreads"], by="model"),
                 menu="Times (Fig. 11)",
+                id="times",
             ),
             section(
-                "convergence",
                 "Convergence of the error correction",
                 convergence_plots(figures, tables["convergence"], figures.part["steps"]),
                 grid(tables["convergence"], by="start"),
                 menu="Convergence (Fig. 10)",
+                id="convergence",
             ),
             section(
-                "scaling",
                 "Scaling over ranks",
                 scaling_plots(figures),
                 modelled(figures),

@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from studies.base.study import Config, Figure, Study
 from workflow import settings, solids
 from workflow.arguments import options
@@ -17,11 +15,11 @@ FIGURES = Study(
     name="figures",
     folder="paper",
     title="Times, convergence and scaling in full",
-    results="results:Figures",
+    results="page:Figures",
     tables=("convergence", "methods", "ratios", "spreads", "scaling", "provenance"),
     measured=lambda config: solids.measured_files(config, MEASURES),
     figures=(
-        Figure("times", "workflow.report.methods_plot:methods_figure", "tables/methods.json"),
+        Figure("times", "workflow.report.plots:methods_figure", "tables/methods.json"),
         Figure(
             "{shape}-convergence",
             "workflow.report.convergence_plot:convergence_figure",

@@ -1,7 +1,5 @@
 """The paper's figures in full: what is planned, and a miniature end to end."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest
@@ -10,8 +8,8 @@ from studies.base.table import read_table
 from studies.benchmark import table as timed
 from studies.figures.study import FIGURES
 from studies.scaling.model import MISFIT_LIMIT
-from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import LAPTOP, PROFILE, TINY, snakemake
+from tests.pages import finished_page
+from tests.workflow_runs import LAPTOP, finished
 from workflow import settings, solids
 from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.methods_tables import METHODS
@@ -99,38 +97,30 @@ def test_tables_of_nothing_have_no_rows():
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def miniature(tmp_path_factory):
     """Folder of the results of the miniature figures."""
-    folder = tmp_path_factory.mktemp("figures")
-    done = snakemake(folder, "figures", "--profile", PROFILE, "--configfile", TINY)
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
-    return folder / "results-tiny" / FIGURES.folder
+    return finished(tmp_path_factory.mktemp("figures"), "figures") / "results-tiny" / FIGURES.folder
 
 
 @pytest.mark.nightly
 @pytest.mark.mpi
-def test_the_page_of_miniature_figures_holds_its_tables_and_plots(finished):
-    page = Page(finished / "report.html")
-    assert_self_contained(page)
-    assert {"plot-times", "plot-bar-convergence", "plot-bar-scaling"} <= set(page.ids)
-    for name in FIGURES.tables:
-        assert_same_numbers(page, finished / "tables", name)
-    for name in ("times", "bar-convergence", "bar-scaling"):
-        assert (finished / "figures" / f"{name}.png").stat().st_size > 5000
+def test_the_page_of_miniature_figures_holds_its_tables_and_plots(miniature):
+    page = finished_page(FIGURES, miniature)
+    assert {"plot-bar-convergence", "plot-bar-scaling"} <= set(page.ids)
     assert "takes for granted" in page.source
 
 
 @pytest.mark.nightly
 @pytest.mark.mpi
-def test_miniature_figures_find_what_the_paper_found(finished):
-    rows = read_table(finished / "tables" / "convergence.json").rows
+def test_miniature_figures_find_what_the_paper_found(miniature):
+    rows = read_table(miniature / "tables" / "convergence.json").rows
     last = {
         row["start"]: row["median"]
         for row in rows
         if row["corrections"] == 3 and "paper" in row["acceleration"]
     }
     assert last["HCMS, free interfaces"] < last["random vectors"]
-    scaling = read_table(finished / "tables" / "scaling.json").rows
+    scaling = read_table(miniature / "tables" / "scaling.json").rows
     strong = {row["ranks"]: row for row in scaling if row["kind"] == "strong"}
     assert strong[1]["note"] == "measured" and strong[1]["measured"] > 0.0
     beyond = [row for row in strong.values() if row["note"] == "model alone"]

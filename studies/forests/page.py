@@ -1,8 +1,5 @@
 """The study of the forests as one page."""
 
-from __future__ import annotations
-
-from functools import partial
 from typing import Any
 
 from dataset_gen.objectives import closed_form
@@ -28,61 +25,64 @@ FIGURES = {
 def page(study: ForestsStudy, tables: dict[str, Table]) -> StudyPage:
     """Build the page from the tables and figures of the study; nothing is computed anew."""
     model = study.model
-    say = partial(
-        html, model=model, samples=model["scores"].get("training_samples"), **findings(study)
-    )
+    values = {
+        **findings(study),
+        "model": model,
+        "samples": model["scores"].get("training_samples"),
+        "plural": "s" * (model["trees"] > 1),
+    }
     drawn = {name: plot(study.drawn(name), text, name) for name, text in FIGURES.items()}
     return StudyPage(
         title="What are the forests worth?",
         kicker="study of the regression forests",
-        lede=say("""Forests that have learned the fit <b>{model[objective]}</b> coarsen a block of
+        lede=html(
+            """Forests that have learned the fit <b>{model[objective]}</b> coarsen a block of
             2×2×2 voxels without fitting it. What do they lose against the fit, what do they cost,
-            and what would other trainings or more data give?"""),
+            and what would other trainings or more data give?""",
+            model=model,
+        ),
         sections=[
             section(
-                "verdict",
                 "Verdict",
                 tiles(
                     (
-                        say("{forest[mean_error]:fraction}"),
-                        say("""mean squared displacement error of the <b>forests</b> on solid
+                        "{forest[mean_error]:fraction}",
+                        """mean squared displacement error of the <b>forests</b> on solid
                             blocks, uniform moduli, nodal forces, relative to the fine
                             displacements; {fit[mean_error]:fraction} by the fit itself,
-                            {forest[min_mean_error]:fraction} by the best element there can be"""),
+                            {forest[min_mean_error]:fraction} by the best element there can be""",
                         "ddfem_hcms_ec",
                     ),
                     (
-                        say("{forest[seconds_per_block]:seconds}"),
-                        say("""a block on one core; the <b>fit</b> on the spot takes
-                            {fit[seconds_per_block]:seconds}, {speed_up:times} as long"""),
+                        "{forest[seconds_per_block]:seconds}",
+                        """a block on one core; the <b>fit</b> on the spot takes
+                            {fit[seconds_per_block]:seconds}, {speed_up:times} as long""",
                         "speed",
                     ),
                     (
-                        say("{model[memory_bytes]:bytes}"),
-                        say(
-                            """<b>storage</b>: {model[trees]} tree{} in each of the two forests,
+                        "{model[memory_bytes]:bytes}",
+                        """<b>storage</b>: {model[trees]} tree{plural} in each of the two forests,
                             {model[leaves]:count} leaves""",
-                            "s" * (model["trees"] > 1),
-                        ),
                     ),
                     (
-                        say("{samples:count}"),
-                        say("<b>blocks</b> were trained on, eight rows each"),
+                        "{samples:count}",
+                        "<b>blocks</b> were trained on, eight rows each",
                         "proof",
                     ),
+                    **values,
                 ),
             ),
             section(
-                "blocks",
                 "Single blocks",
                 drawn["blocks"],
                 grid(tables["blocks"]),
                 grid(tables["every-block"], by="blocks"),
+                id="blocks",
             ),
-            section("trainings", "Ways to train", drawn["variants"], grid(tables["variants"])),
-            section("curve", "Rows", drawn["curve"], grid(tables["curve"])),
-            section("cost", "Cost", grid(tables["cost"]), drawn["sizes"], grid(tables["sizes"])),
-            section("model", "The forests", grid(tables["model"]), menu="Forests"),
+            section("Ways to train", drawn["variants"], grid(tables["variants"]), id="trainings"),
+            section("Rows", drawn["curve"], grid(tables["curve"]), id="curve"),
+            section("Cost", grid(tables["cost"]), drawn["sizes"], grid(tables["sizes"])),
+            section("The forests", grid(tables["model"]), menu="Forests", id="model"),
             origins(tables["provenance"]),
         ],
     )

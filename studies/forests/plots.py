@@ -1,15 +1,14 @@
 """Figures of the study of the forests."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from carillon.files.atomic import atomic_path
 from studies.base.colours import COLOURS, MUTED
-from studies.base.style import named_rows, plain_numbers
+from studies.base.style import logarithmic, named_rows
 from studies.base.table import Row
 from studies.blocks.plot import error_over_cost
 from studies.forests.results import ForestsStudy
@@ -17,7 +16,7 @@ from studies.forests.results import ForestsStudy
 DISTRIBUTIONS = (COLOURS["hcms_ec"], COLOURS["ddfem_hcms_ec"], COLOURS["ddfem_slepc"])
 """Colours of the distributions that forests are scored on."""
 
-PARTS = (
+PARTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("rms_log_solid", "solid", {"linestyle": "-"}),
     ("rms_log_partly_void", "partly void", {"linestyle": "--", "markerfacecolor": "none"}),
 )
@@ -51,7 +50,7 @@ def error_over_rows(rows: Sequence[Row]) -> Figure:
     for distribution, colour in zip(rows[0]["scores"], DISTRIBUTIONS):
         for key, label, look in PARTS:
             values = [row["scores"][distribution][key] for row in rows]
-            axes.loglog(
+            axes.plot(
                 [row["rows"] for row in rows],
                 values,
                 marker="o",
@@ -60,7 +59,8 @@ def error_over_rows(rows: Sequence[Row]) -> Figure:
                 label=f"{distribution.replace('..', '…')}, {label}",
                 **look,
             )
-    plain_numbers(axes.yaxis)
+    axes.set_xscale("log")
+    logarithmic(axes.yaxis)
     axes.set(xlabel="rows trained on", ylabel="rms error of log E on fresh blocks")
     figure.legend(loc="outside upper left", ncols=2, columnspacing=1.2)
     return figure
@@ -84,8 +84,7 @@ def variants_figure(study: ForestsStudy) -> Figure:
                 markerfacecolor=look.get("markerfacecolor", colour),
                 label=f"{distribution.replace('..', '…')}, {label}",
             )
-    axes.set_xscale("log")
-    plain_numbers(axes.xaxis)
+    logarithmic(axes.xaxis)
     named_rows(axes, names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlabel("rms error of log E on fresh blocks")
@@ -101,12 +100,11 @@ def sizes_figure(study: ForestsStudy) -> Figure:
     for (key, label), colour in zip(SIZED.items(), DISTRIBUTIONS):
         values = [size[key]["median"] for size in sizes]
         megabytes = [size["megabytes"] for size in sizes]
-        axes.loglog(megabytes, values, "o-", markersize=4.5, color=colour, label=label)
+        axes.plot(megabytes, values, "o-", markersize=4.5, color=colour, label=label)
     axes.axvline(
         ours, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)), label="the forests studied"
     )
-    plain_numbers(axes.xaxis)
-    plain_numbers(axes.yaxis)
+    logarithmic(axes.xaxis, axes.yaxis)
     axes.set(xlabel="storage of the forests [MB]", ylabel="time of a block [µs], one core")
     figure.legend(loc="outside upper left", ncols=3, columnspacing=1.2)
     return figure

@@ -1,7 +1,5 @@
 """Where the study of the forests keeps its results."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from studies.base.study import Config, Figure, Study

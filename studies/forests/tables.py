@@ -1,7 +1,5 @@
 """Tables of the study of the forests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -58,7 +56,6 @@ def every_block(results: Any) -> Iterator[Row]:
 
 
 def _scores(study: ForestsStudy, part: str) -> list[Column]:
-    """Columns of the scores of trainings, by distribution."""
     names = study.result(part)[0]["scores"]
     return each(
         {f"scores{number}": name.replace("..", "…") for number, name in enumerate(names)},

@@ -1,7 +1,5 @@
 """The default forests and their study: what is planned, mistakes, and a miniature end to end."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -10,13 +8,10 @@ from carillon.errors import UserError
 from forests import default as default_forests
 from studies.base.table import read_table
 from studies.forests.study import FORESTS
-from tests.pages import Page, assert_same_numbers, assert_self_contained
-from tests.workflow_runs import CHECKOUT, LAPTOP, PROFILE, TINY, snakemake
+from tests.pages import finished_page
+from tests.workflow_runs import CHECKOUT, LAPTOP, finished
 from workflow import settings
 from workflow.configuration.whole import completed
-
-FOLDER = "results-tiny"
-FIGURES = [figure.file for figure in FORESTS.figures]
 
 
 def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(plan):
@@ -61,41 +56,29 @@ def test_a_study_beyond_its_data_is_answered_in_one_sentence(changes, says):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def miniature(tmp_path_factory):
     """Folder of the results of tiny default forests and of their study."""
     folder = tmp_path_factory.mktemp("forests-study")
-    targets = ["default_forest", "forests_study"]
-    done = snakemake(folder, *targets, "--profile", PROFILE, "--configfile", TINY)
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-6000:]
-    return folder / FOLDER
+    return finished(folder, "default_forest", "forests_study") / "results-tiny"
 
 
 @pytest.mark.nightly
-def test_tiny_default_forests_hold_the_trees_grown_apart(finished):
-    summary = json.loads((finished / "default_forest" / "forests.json").read_text())
+def test_tiny_default_forests_hold_the_trees_grown_apart(miniature):
+    summary = json.loads((miniature / "default_forest" / "forests.json").read_text())
     assert summary["trees"] == 1
     assert summary["scores"]["r2_log_solid"] > 0.8
-    assert len(list((finished / "default_forest" / "trees").iterdir())) == 2
+    assert len(list((miniature / "default_forest" / "trees").iterdir())) == 2
 
 
 @pytest.mark.nightly
-def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(finished):
-    study = finished / "forests_study"
-    page = Page(study / "report.html")
-    assert_self_contained(page)
-    assert {f"plot-{name}" for name in FIGURES} <= set(page.ids)
-    for name in FORESTS.tables:
-        assert_same_numbers(page, study / "tables", name)
-    for name in FIGURES:
-        assert (study / "figures" / f"{name}.png").stat().st_size > 5000
+def test_the_page_of_a_miniature_study_holds_its_tables_and_figures(miniature):
+    finished_page(FORESTS, miniature / "forests_study")
 
 
 @pytest.mark.nightly
-def test_a_miniature_study_finds_that_more_rows_help(finished):
-    few, many = read_table(finished / "forests_study" / "tables" / "curve.json").rows
+def test_a_miniature_study_finds_that_more_rows_help(miniature):
+    few, many = read_table(miniature / "forests_study" / "tables" / "curve.json").rows
     assert few["rows"] < many["rows"] <= 24000
     assert many["scores0_rms_log_solid"] < few["scores0_rms_log_solid"]
-    variants = read_table(finished / "forests_study" / "tables" / "variants.json").rows
+    variants = read_table(miniature / "forests_study" / "tables" / "variants.json").rows
     assert [row["variant"] for row in variants] == ["logarithms", "logarithms, linear splits"]
-    for row in read_table(finished / "forests_study" / "tables" / "provenance.json").rows:
-        assert row["command"] and row["commit"] and row["config_hash"] and row["versions"]

@@ -1,7 +1,5 @@
 """Limits that an objective should keep, and whether it does."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, starmap
@@ -103,7 +101,6 @@ def rms_limits(study: Objectives, solid: str) -> list[float]:
 
 
 def _columns(index: int, goal: Goal) -> tuple[Column, ...]:
-    """The largest value of a goal, the verdict, and where that value is."""
     key = f"goal{index}"
     where = Column if goal.model is None else hidden
     return (

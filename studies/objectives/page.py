@@ -1,9 +1,5 @@
 """The study of the objectives as one page."""
 
-from __future__ import annotations
-
-from functools import partial
-
 from markupsafe import Markup
 
 from solver.coarsening.forest import FOREST
@@ -28,27 +24,25 @@ def page(study: Objectives, tables: Tables) -> StudyPage:
             own fit{by_forest}?""",
         sections=[
             _verdict(study, tables),
-            section("goals", "Goals", grid(tables["goals"]), _goal_cases(study, tables)),
+            section("Goals", grid(tables["goals"]), _goal_cases(study, tables)),
             section(
-                "forest",
                 "Forests instead of fits",
                 prose(_forest(study, tables["forest"])),
                 grid(tables["forest"]) if tables["forest"].rows else "",
                 menu="Forests",
+                id="forest",
             ),
             section(
-                "solids",
                 "Solids",
                 parts.div("panels", *(_figure(study, solid) for solid in study.solids)),
                 *(_solid(study, tables["errors"], solid) for solid in study.solids),
             ),
             section(
-                "objectives",
                 "Objectives and materials",
                 parts.div("pair", grid(tables["objectives"]), grid(tables["materials"])),
                 menu="Objectives",
             ),
-            section("evidence", "Evidence", grid(tables["truths"], by="model")),
+            section("Evidence", grid(tables["truths"], by="model")),
             origins(tables["provenance"]),
         ],
     )
@@ -58,29 +52,32 @@ def _verdict(study: Objectives, tables: Tables) -> Section:
     rows = {row["coarsening"]: row for row in tables["summary"].rows}
     best = next(row for name, row in rows.items() if name != FOREST)
     (goals,) = tables["goals"].having({"coarsening": best["coarsening"]})
-    say = partial(html, best=best, rows=rows, span=f"7–{study.last['audible']}")
+    span = f"7–{study.last['audible']}"
     fewer = "; ".join(shortened(study))
     return section(
-        "verdict",
         "Verdict",
         parts.tiles(
             (
-                best["coarsening"],
-                say("""has the smallest frequency error over all solids and materials:
-                    <b>{best[all_rms]:percent}</b> rms over modes {span}"""),
+                "{best[coarsening]}",
+                """has the smallest frequency error over all solids and materials:
+                    <b>{best[all_rms]:percent}</b> rms over modes {span}""",
                 "hcms_ec",
             ),
             (
-                say("{best[all_worst]:percent}"),
-                say("is its worst single frequency: {best[all_where]}"),
+                "{best[all_worst]:percent}",
+                "is its worst single frequency: {best[all_where]}",
                 "ddfem_hcms_ec",
             ),
             (
-                say("{rows[galerkin][all_rms]:percent}"),
-                say("""rms by <b>Galerkin projection</b>, {rows[average][all_rms]:percent} by
-                    averaging moduli"""),
+                "{rows[galerkin][all_rms]:percent}",
+                """rms by <b>Galerkin projection</b>, {rows[average][all_rms]:percent} by
+                    averaging moduli""",
             ),
-            (goals["met"], say("<b>goals</b> are met by {best[coarsening]}"), "proof"),
+            ("{goals[met]}", "<b>goals</b> are met by {best[coarsening]}", "proof"),
+            best=best,
+            rows=rows,
+            span=span,
+            goals=goals,
         ),
         parts.note(study.without),
         prose(
@@ -115,7 +112,6 @@ def _goal_cases(study: Objectives, tables: Tables) -> Markup | str:
 
 
 def _forest(study: Objectives, table: Table) -> str:
-    """What the forests lose against the fit that they learned."""
     if table.rows:
         return html(
             """Forests that have learned {forest_objective} take the place of its fit in the row

@@ -1,15 +1,12 @@
 """Figures of the study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 
 from studies.base.colours import COLOURS, FAINT, MUTED
-from studies.base.style import named_rows, plain_numbers
+from studies.base.style import logarithmic, named_rows
 from studies.objectives.goals import rms_limits
 from studies.objectives.results import Objectives
 
@@ -58,9 +55,7 @@ def _mark(axes: Any, row: dict[str, Any], at: float, filled: bool) -> None:
 
 
 def _finish(axes: Any, names: list[str]) -> None:
-    axes.set_xscale("log")
-    plain_numbers(axes.xaxis)
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    logarithmic(axes.xaxis, percent=True)
     named_rows(axes, names)
     for edge in range(1, len(names)):
         axes.axhline(edge - 0.5, color=FAINT, linewidth=0.5)

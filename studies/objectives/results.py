@@ -1,7 +1,5 @@
 """What the study of the objectives has found."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from solver.coarsening.forest import FOREST

@@ -1,19 +1,14 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from dataset_gen import objectives
-from studies.base.cases import CaseStudy
+from studies.base.cases import CaseStudy, case_options
 from studies.base.study import Config, Figure
-from workflow.arguments import options, path_word
 
 
 def arguments(config: Config) -> list[str]:
     """What is compared in every case."""
-    part = config["objectives"]
-    forest = part["forest"] and path_word(part["forest"])
-    compared = ",".join(part["objectives"] or objectives.OBJECTIVES)
-    return options({"forest": forest, "modes": part["modes"], "objectives": compared})
+    compared = ",".join(config["objectives"]["objectives"] or objectives.OBJECTIVES)
+    return case_options(config, "objectives", "modes", objectives=compared)
 
 
 OBJECTIVES = CaseStudy(

@@ -1,14 +1,11 @@
 """Tables of the objectives' study: frequency errors, what proves them, what was compared."""
 
-from __future__ import annotations
-
 import inspect
 import statistics
 from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-import carillon.fem.materials
 from dataset_gen.objectives.fitting import module_of
 from solver.coarsening.forest import FOREST
 from studies.base.cases import Case, case_columns, error_columns, pooled, truths_of
@@ -21,10 +18,19 @@ BASELINES = {
     "galerkin": "No fit: the moduli that give the Galerkin projection of the fine stiffness.",
     "average": "No fit: the mean of the block’s eight moduli at every point.",
 }
+MATERIALS = {
+    "uniform": "1 GPa everywhere.",
+    "smooth": "0.1 to 10 GPa: a smooth random field as log10 of the modulus.",
+    "two-region": (
+        "A half of 10 GPa and one of 0.1 GPa, cut at the median across the longest extent."
+    ),
+    "random": "Independent in every cell, log-uniform over 0.01 to 10 GPa.",
+    "noise": "Independent in every cell, uniform over 0.01 to 10 GPa: seldom soft.",
+}
+"""What each material is."""
 
 
 def _errors_of(part: str, name: str) -> Tabulation:
-    """The table of the errors of a part of the modes by objective and material."""
 
     def rows(study: Objectives) -> list[Row]:
         errors = {
@@ -157,7 +163,7 @@ def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str
             f"No fit: regression forests that have learned {forest['forest_objective']}; "
             f"{forest['forest']}, SHA-256 {forest['forest_sha256']}…"
         )
-    first = _first_line(module_of(coarsening))
+    first = (inspect.getdoc(module_of(coarsening)) or "").split("\n", 1)[0]
     text = first.removeprefix(f"Objective `{coarsening}`:").replace("`", "").strip()
     return text[:1].upper() + text[1:]
 
@@ -168,12 +174,4 @@ def description(coarsening: str, forest: Mapping[str, str] | None = None) -> str
 )
 def materials(study: Objectives) -> Iterable[Row]:
     """Young’s modulus from voxel to voxel; Poisson’s ratio and density are the same everywhere."""
-    functions = {name: name.replace("-", "_") for name in study.part["materials"]}
-    return [
-        {"material": name, "description": _first_line(getattr(carillon.fem.materials, function))}
-        for name, function in functions.items()
-    ]
-
-
-def _first_line(documented: object) -> str:
-    return (inspect.getdoc(documented) or "").split("\n", 1)[0]
+    return [{"material": name, "description": MATERIALS[name]} for name in study.part["materials"]]

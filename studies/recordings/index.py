@@ -1,7 +1,5 @@
 """The page that leads to the recordings, and the tables of all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -44,8 +42,7 @@ class Recordings(Results):
     @property
     def start_seconds(self) -> float:
         """Time of the processor [s] that the start of the program takes."""
-        seconds: float = self.read_json(START)["cpu_seconds"]
-        return seconds
+        return self.read_json(START)["cpu_seconds"]
 
 
 @table(
@@ -144,14 +141,14 @@ def page(index: Recordings, tables: dict[str, Table]) -> StudyPage:
         lede="""Real strikes, with noise, rooms and compressors in them: how much of each do damped
             sinusoids explain?""",
         sections=[
-            section("result", "Result", tiles(*told), grid(tables["groups"], by="split")),
+            section("Result", tiles(*told), grid(tables["groups"], by="split")),
             section(
-                "clips",
                 "Recordings",
                 prose(html("Spectra, sounds and modes of {}.", html(", ").join(led))),
                 grid(tables["clips"], by="split"),
+                id="clips",
             ),
-            section("formats", "Formats", grid(tables["formats"])),
+            section("Formats", grid(tables["formats"])),
         ],
         footer=html("""This page holds its numbers; its tables are also files in
             <span class="file">tables/</span> beside it."""),
@@ -160,21 +157,16 @@ def page(index: Recordings, tables: dict[str, Table]) -> StudyPage:
 
 def _group(split: str, kind: str, rows: list[Row]) -> Row:
     found = [row for row in rows if not row["said"]]
+
+    def over(reduce: Callable[[list[float]], float], key: str) -> float | None:
+        return float(reduce([row[key] for row in found])) if found else None
+
     return {
         "split": split,
         "kind": kind,
         "clips": len(rows),
         "refused": len(rows) - len(found),
-        "modes": _over(median, found, "modes"),
-        "decibels": _over(median, found, "decibels"),
-        "decibels_heard": _over(median, found, "decibels_heard"),
-        "peaks": sum(row["peaks"] for row in found),
-        "missed": sum(row["missed"] for row in found),
-        "cpu_rate": _over(median, found, "cpu_rate"),
-        "cpu_rate_most": _over(max, found, "cpu_rate"),
+        **{key: over(median, key) for key in ("modes", "decibels", "decibels_heard", "cpu_rate")},
+        **{key: sum(row[key] for row in found) for key in ("peaks", "missed")},
+        "cpu_rate_most": over(max, "cpu_rate"),
     }
-
-
-def _over(reduce: Callable[[list[float]], float], rows: list[Row], key: str) -> float | None:
-    """A number of a column; none if there are no rows."""
-    return float(reduce([row[key] for row in rows])) if rows else None

@@ -1,9 +1,5 @@
 """The page of a recording: what was found in it and what was not, to see and to hear."""
 
-from __future__ import annotations
-
-from functools import partial
-
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -42,7 +38,6 @@ def page(results: RecordingResults, tables: dict[str, Table]) -> StudyPage:
     files = (html('<a href="{0}/{1}">{0}/{1}</a>', EXTRACTED, name) for name in (MODES, RESIDUAL))
     modes = (
         section(
-            "modes",
             "Modes",
             prose(html("Files: {}.", html(", ").join(files))),
             grid(tables["missed"]) if tables["missed"].rows else "",
@@ -58,10 +53,9 @@ def page(results: RecordingResults, tables: dict[str, Table]) -> StudyPage:
         kicker=f"extraction of modes · {recording.kind}, {recording.split}",
         lede=html("{0.file}, {1:seconds}, of the package {0.package}.", recording, results.seconds),
         sections=[
-            section("result", "Result", _result(results.summary())),
-            section("spectrum", "Spectrum", plot(spectrum, SPECTRUM)),
+            section("Result", _result(results.summary())),
+            section("Spectrum", plot(spectrum, SPECTRUM)),
             section(
-                "sounds",
                 "Sounds",
                 div("panels", *panels),
                 prose("All on the scales of the clip; longer ones are cut."),
@@ -74,34 +68,32 @@ def page(results: RecordingResults, tables: dict[str, Table]) -> StudyPage:
 
 
 def _result(summary: Row) -> Markup:
-    """What was found, in a few numbers."""
-    say = partial(html, **summary)
     if summary["said"]:
-        return prose(say("The clip was refused: {said}."))
+        return prose(html("The clip was refused: {said}.", **summary))
     return tiles(
         (
-            say("{decibels:fraction} dB"),
-            say("""<b>Explained</b>: {explained:share} of the energy from where modes ring freely;
-                {before:share} of the clip’s comes before"""),
+            "{decibels:fraction} dB",
+            """<b>Explained</b>: {explained:share} of the energy from where modes ring freely;
+                {before:share} of the clip’s comes before""",
             "ddfem_hcms_ec",
         ),
-        (say("{modes:count} modes"), say("<b>Found</b> in the clip"), "hcms_ec"),
+        ("{modes:count} modes", "<b>Found</b> in the clip", "hcms_ec"),
         (
-            say("{missed:count} of {peaks:count}"),
-            say("<b>Strong peaks</b> that no mode accounts for"),
+            "{missed:count} of {peaks:count}",
+            "<b>Strong peaks</b> that no mode accounts for",
             "speed",
         ),
         (
-            say("{cpu:seconds}"),
-            say("""<b>Processor time</b>, the start of the program included;
-                {cpu_rate:fraction} s for a second of sound without it"""),
+            "{cpu:seconds}",
+            """<b>Processor time</b>, the start of the program included;
+                {cpu_rate:fraction} s for a second of sound without it""",
             "proof",
         ),
+        **summary,
     )
 
 
 def _panel(results: RecordingResults, name: str, sound: Array) -> Markup:
-    """Spectrogram and player of a part of the clip, on the clip's own scales."""
     clip, rate = _filled(results.searched, results.rate), results.rate
     loudest = float(spectrogram(clip, rate)[2].max())
     shown = _filled(sound, rate)[: round(SHOWN_SECONDS * rate)]

@@ -1,7 +1,5 @@
 """Figures of a recording's page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -10,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from studies.base.colours import COLOURS, INK, MUTED
-from studies.base.style import plain_numbers
+from studies.base.style import logarithmic
 from studies.recordings.peaks import HIGHEST_SHARE, LOWEST_HERTZ, spectrum
 from studies.recordings.results import RecordingResults
 
@@ -40,13 +38,12 @@ def spectrum_figure(results: RecordingResults) -> Figure:
         places = peaks.hertz[results.missed], peaks.decibels[results.missed] + 2.0
         axes.plot(*places, "v", ms=5.0, color=COLOURS["random"], ls="none", label="missed peak")
     axes.set(
-        xscale="log",
         xlabel="frequency [Hz]",
         ylabel="level [dB]",
         ylim=(FLOOR_DECIBELS, 5.0),
         xlim=(LOWEST_HERTZ, HIGHEST_SHARE * rate),
     )
-    plain_numbers(axes.xaxis)
+    logarithmic(axes.xaxis)
     figure.legend(loc="outside upper right", ncols=4, columnspacing=1.2)
     return figure
 

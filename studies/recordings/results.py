@@ -1,7 +1,5 @@
 """Results of one recording, read from the files that `sound extract` writes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -54,8 +52,7 @@ class RecordingResults(Results):
     @cached_property
     def run(self) -> dict[str, Any]:
         """How the extraction went."""
-        run: dict[str, Any] = self.read_json(self.file(RUN).relative_to(self.folder))
-        return run
+        return self.read_json(self.file(RUN).relative_to(self.folder))
 
     @property
     def refused(self) -> bool:
@@ -75,8 +72,7 @@ class RecordingResults(Results):
     @cached_property
     def found(self) -> dict[str, Any]:
         """What `extract` wrote of the modes."""
-        found: dict[str, Any] = self.read_json(self.file(MODES).relative_to(self.folder))
-        return found
+        return self.read_json(self.file(MODES).relative_to(self.folder))
 
     @property
     def frequencies(self) -> Array:
@@ -103,8 +99,7 @@ class RecordingResults(Results):
     @cached_property
     def residual(self) -> Array:
         """What is left (s,) from there on without the modes."""
-        samples: Array = soundfile.read(self.file(RESIDUAL))[0]
-        return samples
+        return soundfile.read(self.file(RESIDUAL))[0]
 
     @cached_property
     def whole(self) -> Array:

@@ -1,7 +1,5 @@
 """Tables of a recording's page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -25,14 +23,9 @@ def modes(results: RecordingResults) -> Iterator[Row]:
     levels = 20.0 * np.log10(amplitudes / amplitudes.max())
     deviations = found["clips"][0]["frequency_deviations_hz"]
     columns = (found["frequencies_hz"], deviations, found["dampings_per_second"], levels.tolist())
-    for number, (hertz, deviation, damping, level) in enumerate(zip(*columns), 1):
-        yield {
-            "mode": number,
-            "frequency": hertz,
-            "deviation": deviation,
-            "damping": damping,
-            "level": level,
-        }
+    for number, values in enumerate(zip(*columns), 1):
+        named = zip(("frequency", "deviation", "damping", "level"), values)
+        yield {"mode": number, **dict(named)}
 
 
 @table(

@@ -1,7 +1,5 @@
 """The page of the scene that is heard by several modes; sounds stay files beside it."""
 
-from __future__ import annotations
-
 from studies.base.page import StudyPage, section
 from studies.base.parts import audio, figure, grid, html, plot, prose
 from studies.base.table import Table
@@ -36,13 +34,13 @@ def page(results: SceneSpectra, tables: dict[str, Table]) -> StudyPage:
             ones.""",
         sections=[
             section(
-                "spectrograms",
                 "Spectrograms",
                 plot(results.drawn("scene-spectrograms"), levels, "spectrograms"),
                 menu="Spectrograms (Fig. 13)",
+                id="spectrograms",
             ),
-            section("sounds", "Sounds", *heard),
-            section("numbers", "Numbers", grid(table), prose(DISTANCE)),
+            section("Sounds", *heard),
+            section("Numbers", grid(table), prose(DISTANCE)),
         ],
         footer=FOOTER,
     )

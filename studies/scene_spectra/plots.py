@@ -1,7 +1,5 @@
 """Spectrograms of the renderings side by side."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt

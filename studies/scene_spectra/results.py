@@ -1,7 +1,5 @@
 """Results of the scene that is heard by several modes, read when asked for."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from studies.base.study import Figure, Study
 from studies.scene_spectra.scene import FOLDER, RENDERINGS, SOUND, TOLD
 

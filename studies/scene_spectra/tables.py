@@ -1,7 +1,5 @@
 """Rows of the table of the scene that is heard by several modes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

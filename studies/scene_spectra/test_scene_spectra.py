@@ -1,7 +1,5 @@
 """One scene by several modes: how it is planned, its table, figure and page."""
 
-from __future__ import annotations
-
 import json
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The page that shows all scenes; films and sounds stay files beside it."""
 
-from __future__ import annotations
-
 from studies.base.page import Section, StudyPage, section
 from studies.base.parts import audio, element, figure, grid, html, prose
 from studies.base.table import Table
@@ -24,7 +22,7 @@ def page(results: Scenes, tables: dict[str, Table]) -> StudyPage:
         lede="""Solids that fall, roll and strike each other: each sounds by its own modes, where it
             is struck, as hard as it is struck.""",
         sections=[
-            section("overview", "Overview", grid(tables["scenes"]), grid(tables["files"])),
+            section("Overview", grid(tables["scenes"]), grid(tables["files"])),
             *(_scene(scene, tables["impacts"]) for scene in scenes),
         ],
         footer=FOOTER,
@@ -46,7 +44,6 @@ def _scene(scene: SceneExample, impacts: Table) -> Section:
         aria_label=f"{scene.title}, film",
     )
     return section(
-        scene.name,
         scene.title,
         prose(f"{scene.about} ({scene.figure})", html("{}; {}", led[0], html(", ").join(led[1:]))),
         figure(
@@ -55,4 +52,5 @@ def _scene(scene: SceneExample, impacts: Table) -> Section:
             caption=scene.notes,
         ),
         grid(impacts, impacts.having({"scene": scene.name}), skip=("title",)),
+        id=scene.name,
     )

@@ -1,7 +1,5 @@
 """Results of the scenes, read when asked for."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import dataclass
@@ -18,27 +16,24 @@ SECONDS = "s"
 
 @dataclass(frozen=True)
 class PlayedScene:
-    """A scene that was played.
-
-    Attributes
-    ----------
-    example
-        What it is.
-    folder
-        Its files.
-    benchmark
-        File in which Snakemake keeps how long it took; it may be absent.
-    """
+    """A scene that was played."""
 
     example: SceneExample
+    """What it is."""
     folder: Path
+    """Its files."""
     benchmark: Path
+    """File in which Snakemake keeps how long it took; it may be absent."""
+
+    @property
+    def names(self) -> dict[str, str]:
+        """What tables call it."""
+        return {"scene": self.example.name, "title": self.example.title}
 
     @cached_property
     def told(self) -> dict[str, Any]:
         """What the command told."""
-        told: dict[str, Any] = json.loads((self.folder / TOLD).read_text())
-        return told
+        return json.loads((self.folder / TOLD).read_text())
 
     @property
     def wall_seconds(self) -> float:

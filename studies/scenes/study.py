@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from studies.base.study import Study
 from studies.scenes.examples import TOLD, scenes
 

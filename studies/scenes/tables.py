@@ -1,7 +1,5 @@
 """Rows of the tables of the scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from studies.base.table import Column, Row, hidden, table
@@ -36,8 +34,7 @@ def scenes(results: Scenes) -> Iterator[Row]:
         struck = [_impact(line) for line in scene.impacts]
         yield {
             **scene.told,
-            "scene": scene.example.name,
-            "title": scene.example.title,
+            **scene.names,
             "impacts": len(struck),
             "first": struck[0]["seconds"] if struck else None,
             "hardest": max((row["impulse"] for row in struck), default=None),
@@ -57,7 +54,7 @@ def scenes(results: Scenes) -> Iterator[Row]:
 def files(results: Scenes) -> Iterator[Row]:
     """Sizes of the files of every scene."""
     for scene in results.scenes:
-        yield {"scene": scene.example.name, "title": scene.example.title, **scene.sizes}
+        yield {**scene.names, **scene.sizes}
 
 
 @table(
@@ -79,12 +76,7 @@ def impacts(results: Scenes) -> Iterator[Row]:
         rows = [_impact(line) for line in scene.impacts]
         rows.sort(key=lambda row: -row["impulse"])
         for number, row in enumerate(rows[:HARDEST], 1):
-            yield {
-                "scene": scene.example.name,
-                "title": scene.example.title,
-                "number": number,
-                **row,
-            }
+            yield {**scene.names, "number": number, **row}
 
 
 def _impact(line: dict[str, str]) -> Row:

@@ -1,7 +1,5 @@
 """Scenes of designs: what they are, how they are planned, and their page."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The page that sets the optimisers beside each other, by several seeds on the recorded solids."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
@@ -70,7 +68,7 @@ def page(results: ComparedSounds, tables: dict[str, Table]) -> StudyPage:
         title="Optimisers by several seeds",
         kicker="sound design",
         lede="Does the hybrid find better materials than its parts, or was it luck?",
-        sections=[section("optimisers", "Optimisers", grid(tables["comparison"]))],
+        sections=[section("Optimisers", grid(tables["comparison"]))],
         footer=html("""This page holds all of its numbers; its table is also a file in
             <span class="file">tables/</span> beside it."""),
     )

@@ -1,7 +1,5 @@
 """The page that leads to the examples."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -106,7 +104,6 @@ def distances(index: Examples) -> Iterator[Row]:
 
 
 def _rows(results: SoundResults, table: str) -> list[Row]:
-    """Rows of a table of an example's page."""
     return read_table(results.file(f"tables/{table}.json")).rows
 
 
@@ -117,7 +114,7 @@ def page(index: Examples, tables: dict[str, Table]) -> StudyPage:
         kicker="examples",
         lede=index.about,
         sections=[
-            section("overview", "Overview", grid(tables["sounds"]), grid(tables["distances"])),
+            section("Overview", grid(tables["sounds"]), grid(tables["distances"])),
             *map(_heard, index.examples),
         ],
         footer="""This page holds its sounds and numbers; its tables are also files in a folder
@@ -126,7 +123,6 @@ def page(index: Examples, tables: dict[str, Table]) -> StudyPage:
 
 
 def _heard(results: SoundResults) -> Section:
-    """An example: every clip and then the sound of the design, each as loud as it can be."""
     example = results.example
     led = '<a href="{}/page.html">Spectrograms, material, modes and files</a>'
     panels = []
@@ -139,4 +135,4 @@ def _heard(results: SoundResults) -> Section:
         told = facts(name, "target, then the sound that was found")
         panels.append(figure(told, audio(source, f"{example.title}, {target.name}")))
     about = prose(f"{example.about} ({example.figure})", html(led, example.name))
-    return section(example.name, example.title, about, div("panels", *panels))
+    return section(example.title, about, div("panels", *panels), id=example.name)

@@ -1,7 +1,5 @@
 """The material on the solid, with the places that are struck."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of an example's page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 
 from studies.base.colours import COLOURS, INK, MUTED
 from studies.base.media import COLOUR_MAP
-from studies.base.style import plain_numbers
+from studies.base.style import logarithmic
 from studies.base.table import Table
 from studies.sounds.results import SoundResults
 from studies.sounds.tables import METHODS
@@ -125,9 +123,8 @@ def limits(young: Array) -> tuple[float, float]:
 
 
 def _cost_axes(axes: Any) -> None:
-    """Axes of costs over wall time, with plain numbers."""
-    axes.set(yscale="log", xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
-    plain_numbers(axes.yaxis)
+    axes.set(xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
+    logarithmic(axes.yaxis)
 
 
 def _ticks(low: float, high: float) -> list[float]:
@@ -142,5 +139,4 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def _positive(values: Array) -> Array:
-    """Values that a logarithmic axis shows."""
     return np.asarray(np.maximum(values, _MIN_SHARE * values.max()))

@@ -1,7 +1,5 @@
 """Results of an example, read when asked for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,21 +29,14 @@ CLIPS = "clips"
 
 @dataclass(frozen=True)
 class TargetSounds:
-    """A clip from where its modes ring freely on, and what is known of it.
-
-    Attributes
-    ----------
-    clip : (s,)
-        Its samples.
-    modes : (s,)
-        All modes that were found in it.
-    wanted : (s,)
-        Those that are designed, as a material sounds that has them all.
-    """
+    """A clip from where its modes ring freely on, and what is known of it."""
 
     clip: Array
+    """(s,) its samples."""
     modes: Array
+    """(s,) all modes that were found in it."""
     wanted: Array
+    """(s,) those that are designed, as a material sounds that has them all."""
 
 
 @dataclass(frozen=True)

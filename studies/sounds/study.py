@@ -1,7 +1,5 @@
 """What the study is made of."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from studies.base.study import Config, Study
@@ -30,7 +28,6 @@ SOUND = Study(
 
 
 def _made(listed: str) -> Callable[[Config], list[str]]:
-    """Tables and pages of the examples of a list of the configuration."""
     made = [*(f"tables/{name}.json" for name in READ), "page.html"]
     return lambda config: [f"{name}/{file}" for name in config["sound"][listed] for file in made]
 

@@ -1,7 +1,5 @@
 """Tables of an example's page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -295,6 +293,5 @@ def _rms(values: Array) -> float:
 
 
 def _by_mode(**columns: Array) -> Iterator[Row]:
-    """Rows of columns (N,) with a value a mode."""
     for index, values in enumerate(zip(*columns.values())):
         yield {"mode": index + 1, **dict(zip(columns, map(float, values)))}

@@ -1,7 +1,5 @@
 """Tables of errors, cost and storage on single blocks, as in Fig. 9 of the paper."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

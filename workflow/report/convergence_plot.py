@@ -1,7 +1,5 @@
 """Figure of how the eigenvalues approach the truth, correction by correction (Fig. 10)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.pyplot as plt

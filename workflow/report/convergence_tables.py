@@ -1,7 +1,5 @@
 """How fast corrections converge from each start (Fig. 10), as a table and in a sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What an evaluation of a design takes beside SLEPc: the headline of a report, and its costs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

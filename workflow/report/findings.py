@@ -1,7 +1,5 @@
 """What the tables say, in the few numbers that a reader wants first."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pandas as pd

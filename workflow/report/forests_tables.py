@@ -1,7 +1,5 @@
 """Tables of the training data and of the forests' quality."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

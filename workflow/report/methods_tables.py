@@ -1,7 +1,5 @@
 """Tables of all methods timed in alternating runs (Fig. 11)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

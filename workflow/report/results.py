@@ -1,7 +1,5 @@
 """Where a run keeps its results, and how they are read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Wall time over MPI ranks, measured and modelled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -84,7 +82,6 @@ def _parts(results: Any) -> Iterator[tuple[str, str, Row]]:
 
 
 def _misfit(run: Row | None, modelled: Row | None) -> float | None:
-    """Relative difference of the model from a run that has its cores."""
     if run is None or modelled is None or run["oversubscribed"]:
         return None
     return float(modelled["total"] / run["seconds"] - 1.0)

@@ -1,7 +1,5 @@
 """Tables of the spectra of a run: errors against the ground truth, wall times, proofs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from carillon.fem.model import RIGID_MODES
@@ -19,7 +17,6 @@ UNTIMED, ONE_RUN = measured(records, NOT_TIMED), measured(records, ONE_COLD_RUN)
 
 
 def _identity(run: Run, model: str) -> Row:
-    """Which solid a row is about, and how large it is."""
     spectra = run.spectra[model]
     return {
         **solid(run, model),

@@ -1,7 +1,5 @@
 """The report of a run as a study: what it is made from, and which figures it draws."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -19,7 +17,6 @@ MEASURES = {
 def _by_variant(
     config: Config, names: Callable[[Mapping[str, Any]], Iterable[str]], pattern: str
 ) -> list[str]:
-    """Files of all models by the variants that `names` tells of each."""
     return [
         pattern.format(model=name, variant=variant)
         for name, model in config["models"].items()
@@ -42,7 +39,6 @@ def _measured(config: Config) -> list[str]:
 
 
 def _beside(config: Config) -> list[str]:
-    """Pictures of modes, and what the validations say."""
     models = config["models"]
     return [
         *_by_variant(config, variants.shown_of, "figures/{model}-mode-{variant}.png"),
@@ -80,6 +76,6 @@ REPORT = Study(
             of="scaling.models",
         ),
         Figure("times", "plots:times_figure", "tables/times.json"),
-        Figure("methods", "methods_plot:methods_figure", "tables/methods.json"),
+        Figure("methods", "plots:methods_figure", "tables/methods.json"),
     ),
 )

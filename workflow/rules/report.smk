@@ -61,7 +61,7 @@ rule draw_overview:
         f"{LOGS}/figures/{{model}}-overview.log",
     localrule: True
     params:
-        **made_by("plot", report_study.REPORT, "overview:overview_figure"),
-        draw="overview:overview_figure",
+        **made_by("plot", report_study.REPORT, "mode_pictures:overview_figure"),
+        draw="mode_pictures:overview_figure",
     script:
         "../../studies/base/scripts/plot.py"

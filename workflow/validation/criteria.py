@@ -1,7 +1,5 @@
 """What a spectrum has to satisfy to be trusted, whether it does, and what that means in words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,43 +26,29 @@ SOLID = "solid"
 
 @dataclass(frozen=True)
 class Criterion:
-    """One requirement.
-
-    Attributes
-    ----------
-    group
-        Variant that is judged.
-    key
-        Name within the group.
-    label
-        What is measured.
-    found, limit
-        Values; None if nothing was found.
-    kind
-        How both are shown, see `studies.base.numbers.show`.
-    exact
-        Whether the limit must be hit; otherwise it must not be passed.
-    allowed
-        What the tolerance of the run allows; None where the limit itself says what is wrong.
-    why
-        Why it matters, in one sentence.
-    missed
-        What it means if it is missed; empty if the spectrum is wrong then.
-    source
-        File below the folder of the run, and key in it.
-    """
+    """One requirement."""
 
     group: str
+    """Variant that is judged."""
     key: str
+    """Name within the group."""
     label: str
+    """What is measured."""
     found: float | None
     limit: float
+    """Values; None if nothing was found."""
     kind: str
+    """How both are shown, see `studies.base.numbers.show`."""
     why: str
+    """Why it matters, in one sentence."""
     source: str
+    """File below the folder of the run, and key in it."""
     missed: str = ""
+    """What it means if it is missed; empty if the spectrum is wrong then."""
     exact: bool = False
+    """Whether the limit must be hit; otherwise it must not be passed."""
     allowed: float | None = None
+    """What the tolerance of the run allows; None where the limit itself says what is wrong."""
 
     @property
     def passed(self) -> bool:
@@ -173,7 +157,6 @@ def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
 def _criteria(
     evidence: Evidence, part: str, variant: str, values: dict[str, Worst], **names: str
 ) -> Iterator[Criterion]:
-    """Criteria of a part of the texts, whose labels may hold the `names`."""
     names |= {
         "variant": variant,
         "audit": evidence.file("audit.json"),

@@ -1,7 +1,5 @@
 """How close the model is to the solid, and what brings it closer, in words."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """All that a run found out about one model, read when asked for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -68,7 +66,6 @@ class Evidence(Run):
 
     @cached_property
     def _comparisons(self) -> dict[str, Any]:
-        """Output of `solver compare`: `comparisons` by variant, and `provenance`."""
         return self.read_json(self.file("comparisons.json"))
 
     @cached_property

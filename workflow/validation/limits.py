@@ -3,8 +3,7 @@
 The derivations are in docs/explanation/trust.md.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,22 +27,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Worst:
-    """The worst value of a criterion beside its limit.
-
-    Attributes
-    ----------
-    value, limit
-        Worst, and required; None if nothing was found.
-    allowed
-        What the tolerance of the run allows; None if nothing follows from it.
-    where
-        The modes that have it.
-    """
+    """The worst value of a criterion beside its limit."""
 
     value: float | None
     limit: float
+    """Worst, and required; None if nothing was found."""
     allowed: float | None = None
+    """What the tolerance of the run allows; None if nothing follows from it."""
     where: str = ""
+    """The modes that have it."""
 
 
 def residual(evidence: Evidence, variant: str) -> Worst:
@@ -52,8 +44,7 @@ def residual(evidence: Evidence, variant: str) -> Worst:
     allowed = residual_limits(values, _errors(evidence, variant))[RIGID_MODES:]
     values = np.array(evidence.audit["spectra"][variant]["energy_residuals"])[RIGID_MODES:]
     key = "truth_residual" if variant == TRUTH else "residual"
-    worst, found = _worst(values, allowed, evidence.tolerances[key])
-    return Worst(*found, f"mode {RIGID_MODES + 1 + worst}")
+    return _worst(values, allowed, evidence.tolerances[key], _mode)
 
 
 def orthogonality(evidence: Evidence, variant: str) -> Worst:
@@ -72,8 +63,7 @@ def eigenvalue_error(evidence: Evidence) -> Worst:
     rounding = np.array(evidence.audit["spectra"][TRUTH]["rounding"])
     tolerance = ACCEPTED * evidence.config["solver"]["tolerance"]
     allowed = accepted_errors(exact, rounding, tolerance)[elastic] / exact[elastic]
-    worst, found = _worst(errors, allowed, evidence.tolerances["eigenvalue_error"])
-    return Worst(*found, f"mode {RIGID_MODES + 1 + worst}")
+    return _worst(errors, allowed, evidence.tolerances["eigenvalue_error"], _mode)
 
 
 def subspace_angle(evidence: Evidence) -> Worst:
@@ -83,13 +73,9 @@ def subspace_angle(evidence: Evidence) -> Worst:
     if not clusters:
         return Worst(None, 0.0 if limit is None else limit)
     groups = [(cluster["first"], cluster["last"]) for cluster in clusters]
-    worst, found = _worst(
-        np.array([cluster["angle"] for cluster in clusters]),
-        angles_allowed(evidence, groups),
-        limit,
-    )
-    first, last = groups[worst]
-    return Worst(*found, f"mode {first}" if first == last else f"modes {first}–{last}")
+    angles = np.array([cluster["angle"] for cluster in clusters])
+    names = [f"mode {a}" if a == b else f"modes {a}–{b}" for a, b in groups]
+    return _worst(angles, angles_allowed(evidence, groups), limit, names.__getitem__)
 
 
 def angles_allowed(evidence: Evidence, groups: list[tuple[int, int]]) -> Array:
@@ -127,11 +113,14 @@ def _errors(evidence: Evidence, variant: str) -> Array:
     return errors
 
 
-def _worst(
-    values: Array, allowed: Array, limit: float | None
-) -> tuple[int, tuple[float, float, float]]:
-    """Number of the largest share of a limit; the value, its limit, and what is allowed."""
+def _mode(index: int) -> str:
+    return f"mode {RIGID_MODES + 1 + index}"
+
+
+def _worst(values: Array, allowed: Array, limit: float | None, name: Callable[[int], str]) -> Worst:
+    """The largest share of a limit."""
     limits = allowed if limit is None else np.full(len(values), limit)
     share = np.where(np.isnan(values), np.inf, values / limits)
     worst = int(np.argmax(share))
-    return worst, (float(values[worst]), float(limits[worst]), float(allowed[worst]))
+    value, limit, accepted = (float(part[worst]) for part in (values, limits, allowed))
+    return Worst(value, limit, accepted, name(worst))

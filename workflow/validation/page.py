@@ -1,10 +1,7 @@
 """The page that says how far the spectra of one model can be trusted, and why."""
 
-from __future__ import annotations
-
 import hashlib
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,20 +13,20 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import load_surface
 from carillon.records import provenance
-from solver.response.response import STRIKE_SECONDS
 from studies.base import parts
-from studies.base.media import embedded, inlined, wav_uri
+from studies.base.media import embedded, inlined
 from studies.base.page import Section, StudyPage, listed_modes, origins, section
-from studies.base.parts import grid, html, plot, prose, unbroken
+from studies.base.parts import grid, html, plot, prose
 from studies.base.table import Table
 from workflow import settings
-from workflow.report.page import mode_pictures, variant_name, variants_key
-from workflow.validation import plots
+from workflow.report.page import mode_pictures
+from workflow.report.verdict import variants_key
+from workflow.validation import plots, strike
 from workflow.validation.criteria import verdict
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import COARSENED, Evidence
-from workflow.validation.pictures import solid_pictures, struck_picture
-from workflow.variants import TRUTH, VARIANTS
+from workflow.validation.pictures import solid_pictures
+from workflow.variants import TRUTH
 
 Tables = dict[str, Table]
 
@@ -41,14 +38,6 @@ UNDIVIDED = """Finite cells are undivided here, as with <code>carillon modes --r
     so that all methods solve one mesh. Without that option <code>modes</code> divides cells with
     large errors and comes nearer to the solid."""
 COARSE_LIMIT = ", and for the worst of the coarsened solid’s frequencies 7–60 (right)"
-CHOSEN = """ The ground truth chose both: where its six lowest elastic modes give way most to a
-    push, and what moves most far from there."""
-STRIKES = """Spectrograms of three strikes, {} s apart, at the arrow, at the ring and at {}, by a
-    force of half a sine of {:fraction} ms. Each is heard at the point that is struck: the sum of
-    a<sub>k</sub> exp(−ξ<sub>k</sub>ω<sub>k</sub>t) sin(ω<sub>d</sub>t) over the modes from 20 Hz to
-    20 kHz, with a<sub>k</sub> = (u<sub>k</sub><sup>T</sup>f)(u<sub>k</sub><sup>T</sup>n). Every
-    strike is played so that the ground truth’s are equally loud; levels are below its loudest.
-    Radiation into the air is not modelled."""
 FOOTER = html("""This page holds all of its figures and numbers; its tables are also files in
     <span class="file">tables/</span> beside it, and what it is made from lies in
     <span class="file">models/</span> in the folder above. Frequencies are in Hz, eigenvalues in
@@ -71,7 +60,6 @@ def page(evidence: Evidence, tables: Tables) -> StudyPage:
             *_judged(evidence, tables),
             _solid(evidence),
             section(
-                "spectrum",
                 "Spectrum",
                 plot(
                     inlined(plots.errors_figure(evidence, tables["errors"]), "errors"),
@@ -83,7 +71,6 @@ def page(evidence: Evidence, tables: Tables) -> StudyPage:
                 grid(tables["errors"], listed_modes(tables["errors"].rows)),
             ),
             section(
-                "shapes",
                 "Shapes",
                 mode_pictures(evidence, evidence.model),
                 parts.div(
@@ -98,9 +85,9 @@ def page(evidence: Evidence, tables: Tables) -> StudyPage:
                     grid(tables["shapes"]),
                 ),
             ),
-            section("proofs", "Proofs", prose(PROVEN, _counted(evidence)), grid(tables["audits"])),
-            _motion(evidence, tables),
-            _sound(evidence),
+            section("Proofs", prose(PROVEN, _counted(evidence)), grid(tables["audits"])),
+            strike.motion(evidence, tables["responses"]),
+            strike.sound(evidence),
             _provenance(evidence, tables["provenance"]),
         ],
         footer=FOOTER,
@@ -108,7 +95,6 @@ def page(evidence: Evidence, tables: Tables) -> StudyPage:
 
 
 def _judged(evidence: Evidence, tables: Tables) -> tuple[Section, Section]:
-    """The verdict in words, and its criteria one by one."""
     judged, distance = verdict(evidence), distance_in_words(evidence)
     taken = evidence.fine_taken(evidence.model)
     styles = {None: "", True: "passed", False: "failed"}
@@ -118,7 +104,6 @@ def _judged(evidence: Evidence, tables: Tables) -> tuple[Section, Section]:
     )
     passed = "passed" if judged["passed"] else "failed"
     told = section(
-        "verdict",
         "Verdict",
         parts.element("p", judged["headline"], class_=f"judgement {passed}"),
         prose(judged["advice"]),
@@ -151,11 +136,10 @@ def _judged(evidence: Evidence, tables: Tables) -> tuple[Section, Section]:
     of_solid = (parts.element("p", f"{last['sentence']}{limits}"), grid(tables["solid"]))
     articles = [*map(_criteria, others), _criteria(last, *of_solid)]
     proof = parts.element("p", about, class_="proof")
-    return told, section("criteria", "Criteria", *articles, proof)
+    return told, section("Criteria", *articles, proof)
 
 
 def _criteria(part: dict[str, Any], *further: Markup) -> Markup:
-    """The criteria of a part of the verdict, each with the file and key of its number."""
     criteria = part["criteria"]
     if not criteria:
         return parts.article(None, part["question"], *further)
@@ -187,12 +171,7 @@ def _cells(evidence: Evidence) -> FiniteCells | None:
     return model.cells if isinstance(model, FiniteCellModel) else None
 
 
-def _lengths(values: Iterable[float]) -> str:
-    return " × ".join(unbroken(each, "fraction") for each in values)
-
-
 def _solid(evidence: Evidence) -> Section:
-    """Pictures and sizes of the solid."""
     mesh_name = settings.mesh_of(evidence.config, evidence.model)
     part = evidence.settings
     surface = load_surface(mesh_name, part["unit"])
@@ -236,7 +215,6 @@ def _solid(evidence: Evidence) -> Section:
         and {"the surface" if cells else "the same voxels"} in the colours of their moduli, which
         are those of the histogram below. All are seen from the same side, at the same scale."""
     return section(
-        "solid",
         "Solid",
         parts.facts(
             mesh_name,
@@ -245,8 +223,8 @@ def _solid(evidence: Evidence) -> Section:
             html("<span>density {density:count} kg/m³</span>", **part),
             f"Poisson’s ratio {evidence.config['poisson']}",
             html("<span>mass {:fraction} kg</span>", model.mass),
-            f"mesh {_lengths(sides)} m",
-            "" if cells else f"voxels {_lengths(np.ptp(mesh.nodes, axis=0))} m",
+            f"mesh {strike.lengths(sides)} m",
+            "" if cells else f"voxels {strike.lengths(np.ptp(mesh.nodes, axis=0))} m",
         ),
         parts.figure(parts.pictures(shown, "three"), caption=about),
         plot(
@@ -258,7 +236,6 @@ def _solid(evidence: Evidence) -> Section:
 
 
 def _counted(evidence: Evidence) -> str:
-    """What was counted of the spectra, and what follows for those without a count."""
     counted = evidence.shown[TRUTH].attributes
     beyond = (
         f""" The run that made the ground truth went on to a gap beyond it:
@@ -276,87 +253,7 @@ def _counted(evidence: Evidence) -> str:
         matrices and agrees with the ground truth mode by mode.{coarse}"""
 
 
-def _place(evidence: Evidence, name: str) -> str:
-    """A point that is struck or watched, in the mesh's own coordinates."""
-    position = evidence.response.contacts[name].position / evidence.settings["unit"]
-    return parts.place(position.tolist())
-
-
-def _motion(evidence: Evidence, tables: Tables) -> Section:
-    """Where and how the solid is struck, and how it moves."""
-    response, model = evidence.response, evidence.shown[TRUTH].model
-    strike, observed = response.contacts["strike"], response.contacts["observed"]
-    picture = struck_picture(model.mesh, strike, observed, evidence.skin(evidence.model, model))
-    alt = f"{evidence.titles[evidence.model]}: where it is struck and watched"
-    coarse = COARSENED in evidence.shown
-    chosen = any(evidence.settings[name] is not None for name in ("strike", "observed"))
-    where = f"""The arrow is where an impulse of 1 N·s strikes along the inward normal, at
-        {_place(evidence, "strike")}; the ring is the point that is watched, at
-        {_place(evidence, "observed")}, in the mesh’s own coordinates.{"" if chosen else CHOSEN}"""
-    how = html(
-        """A free body also flies off and turns. That rigid motion is left out; the elastic modes
-        alone are superposed. Damping is Rayleigh’s, {mass_damping:fraction} s⁻¹ of the mass and
-        {stiffness_damping:small} s of the stiffness.{}""",
-        """ The coarsened solid is watched at the same point, interpolated in the cell that it lies
-        in."""
-        if coarse
-        else "",
-        **response.attributes,
-    )
-    about = html(
-        """Displacement of the ringed point over {:fraction} ms, along the direction in which it
-        moves most, and length of its difference from the ground truth’s over the ground truth’s
-        largest displacement. A frequency that is slightly off runs out of step after some swings,
-        so {} difference grows although it moves alike.""",
-        1e3 * float(response.seconds[-1]),
-        "the coarsened solid’s" if coarse else "a",
-    )
-    return section(
-        "motion",
-        "Motion after a strike",
-        parts.div(
-            "beside",
-            parts.figure(parts.image(embedded(picture), alt)),
-            parts.element("div", parts.element("p", where), parts.element("p", how)),
-        ),
-        plot(inlined(plots.motion_figure(response), "motion"), about),
-        grid(tables["responses"]),
-        menu="Motion",
-    )
-
-
-def _sound(evidence: Evidence) -> Section:
-    """Sound and spectrogram of every method; a sentence if no mode of the truth is heard."""
-    response = evidence.response
-    if not response.responses[TRUTH].sound.any():
-        surface = load_surface(
-            settings.mesh_of(evidence.config, evidence.model), evidence.settings["unit"]
-        )
-        sides = _lengths(np.ptp(np.asarray(surface.bounds), axis=0))
-        silent = f"""Nothing is to be heard: no elastic mode lies between 20 Hz and 20 kHz. Check
-            the unit of the mesh; the solid measures {sides} m."""
-        return section("sound", "Sound", prose(silent))
-    loudest = max(float(np.abs(part.sound).max()) for part in response.responses.values())
-    rate = int(response.attributes["sample_rate"])
-    panels = []
-    for variant, part in response.responses.items():
-        away = html(", {:small} dB from the ground truth", part.distance_decibels)
-        heard = html(
-            "<span>{} modes heard{}</span>", part.audible, "" if variant == TRUTH else away
-        )
-        drawn = inlined(plots.sound_figure(response, variant), f"sound-{variant}")
-        source = wav_uri(part.sound, rate, loudest)
-        player = parts.audio(source, f"Sound by {VARIANTS[variant].label}")
-        told = parts.facts(variant_name(variant), heard)
-        panels.append(parts.figure(told, drawn, player, class_="plot"))
-    contact = 1e3 * response.attributes["contact_seconds"]
-    about = html(STRIKES, STRIKE_SECONDS, _place(evidence, "third"), contact)
-    proof = parts.element("p", about, class_="proof")
-    return section("sound", "Sound", parts.div("panels", *panels), proof)
-
-
 def _provenance(evidence: Evidence, table: Table) -> Section:
-    """Files, the page's own origin, and the part of the configuration that tells on the solid."""
     record = provenance.record({"config": evidence.config})
     page = html(
         "rule validate_model; commit {commit}, hash of the configuration {config_hash}", **record
@@ -365,16 +262,15 @@ def _provenance(evidence: Evidence, table: Table) -> Section:
     files = ((_wrapped(name), html(begins, digest)) for name, digest in _digests(evidence))
     own = origins(table, "at the end of this page, its part that tells on this solid")
     return section(
-        own.id,
         own.title,
         own.content,
         parts.definitions([("This page", page), *files], class_="machine"),
         parts.element("pre", _configuration(evidence), class_="config"),
+        id=own.id,
     )
 
 
 def _digests(evidence: Evidence) -> list[tuple[str, str]]:
-    """Names and first digits of the SHA-256 of the files that everything is made from."""
     given = settings.model_files(evidence.config, evidence.model)
     made = [str(evidence.modes_path(evidence.model, variant)) for variant in evidence.shown]
     digests = []
@@ -386,7 +282,6 @@ def _digests(evidence: Evidence) -> list[tuple[str, str]]:
 
 
 def _configuration(evidence: Evidence) -> str:
-    """The part of the configuration that tells on this solid."""
     config = evidence.config
     parts = {key: config[key] for key in ("poisson", "solver", "validation")}
     forests = {"model": config["forests"]["model"]}

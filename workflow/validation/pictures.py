@@ -1,7 +1,5 @@
 """Pictures of the solid: its surface, its voxels, its material, and where it is struck."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

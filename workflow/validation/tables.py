@@ -1,7 +1,5 @@
 """Tables of the page; their files are named after the model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
