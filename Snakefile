@@ -25,6 +25,7 @@ if not workflow.overwrite_configfiles:
 try:
     config = settings.complete(workflow.configfiles, workflow.config_settings.config)
     settings.check_files(config)
+    rules_of_studies = studies.rules()
 except UserError as error:
     raise WorkflowError(str(error)) from None
 
@@ -41,7 +42,7 @@ include: f"{RULES}/report.smk"
 
 
 # A study is a folder, its rules as well.
-for rules_of_study in studies.rules():
+for rules_of_study in rules_of_studies:
 
     include: str(rules_of_study)
 

@@ -19,7 +19,6 @@ import pytest
 import carillon
 from carillon.processes import mpi_environment
 from carillon.processes.threads import allowed_threads
-from studies.recordings.packages import SOUNDS
 from tests import tiers
 from tests.chromium import chromium
 from tests.hostile import fuzzing, summary
@@ -298,19 +297,6 @@ def meshes() -> Path:
     if missing:
         pytest.skip(
             f"no {' and '.join(missing)} in {folder}; set CARILLON_MESHES to a folder that has them"
-        )
-    return folder
-
-
-@pytest.fixture(scope="session")
-def recordings_folder() -> Path:
-    """Folder of the packages with real recordings; skips the test where it is absent."""
-    named = os.environ.get("CARILLON_RECORDINGS")
-    folder = Path(named) if named else CHECKOUT / "results" / "recordings" / "packages"
-    if not all((folder / package).is_dir() for package in SOUNDS):
-        pytest.skip(
-            f"no recordings in {folder}; `carillon recordings --out FOLDER` brings them, and "
-            "CARILLON_RECORDINGS names another folder"
         )
     return folder
 

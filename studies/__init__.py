@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from carillon.command_line.commands import Command
+from carillon.errors import UserError
 
 FOLDER = Path(__file__).resolve().parent
 PAGE_COMMAND = "studies.base.page_command"
@@ -31,18 +32,30 @@ def names_with(file: str) -> list[str]:
 
 
 def rules() -> list[Path]:
-    """Files of rules; those of a study after those of the studies in its `NEEDS`."""
+    """Files of rules; those of a study after those of the studies in its `NEEDS`.
+
+    Raises UserError if a study, or the report of a run, needs one that is not there.
+    """
+    present = names()
     ordered: list[str] = []
 
-    def add(name: str) -> None:
+    def add(name: str, needed_by: str) -> None:
+        if name not in present:
+            raise UserError(
+                f"there is no folder studies/{name}, which {needed_by} needs; put it back, or "
+                f"take {needed_by} away, too"
+            )
         for other in getattr(import_module(f"studies.{name}"), "NEEDS", ()):
-            add(other)
+            add(other, f"studies/{name}")
         if name not in ordered:
             ordered.append(name)
 
-    for name in names_with("rules.smk"):
-        add(name)
-    return [FOLDER / name / "rules.smk" for name in ordered]
+    for name in import_module("workflow.report").NEEDS:
+        add(name, "workflow/report")
+    for name in present:
+        add(name, name)
+    with_rules = names_with("rules.smk")
+    return [FOLDER / name / "rules.smk" for name in ordered if name in with_rules]
 
 
 def commands() -> dict[str, Command]:

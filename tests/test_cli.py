@@ -4,6 +4,7 @@ import errno
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from carillon import __version__
+from carillon.__main__ import main
 from carillon.command_line import exit_status
 from carillon.command_line.arguments import Parser
 from carillon.command_line.commands import run_program
 from carillon.errors import ConvergenceError, UserError, on_all_ranks
 from carillon.fem.geometry.builtin import builtin_surface
+from studies.base import page_command
 from tests.programs import CHECKOUT, run
 from tests.rank_counts import SEVERAL
 
@@ -241,3 +244,15 @@ def test_complaints_that_nobody_takes_change_no_status(tmp_path):
         'def main(): raise UserError(1)\nraise SystemExit(exit_status.run(1, main))" 2> /dev/full'
     )
     assert subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT).returncode == 2
+
+
+def test_a_page_command_hands_options_on(monkeypatch):
+    started = []
+    monkeypatch.setattr(
+        page_command.subprocess,
+        "run",
+        lambda command: started.append(command) or SimpleNamespace(returncode=3),
+    )
+    words = ["study", "claims", "-n", "--configfile", "a.yaml", "--cores", "2", "tables"]
+    assert main(words) == 3
+    assert started[0][-6:] == ["2", "claims", "-n", "--configfile", "a.yaml", "tables"]

@@ -1,6 +1,7 @@
 """Which package may import which: every arrow is listed, and none points back."""
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import studies
+from carillon.errors import UserError
 from tests.programs import CHECKOUT, python
 
 ROOMS = ("carillon", "dataset_gen", "forests", "solver", "sound", "studio", "workflow", "studies")
@@ -226,6 +228,29 @@ def test_a_study_imports_the_product_and_those_studies_that_it_needs(study):
     own = [module for module in modules() if study_of(module) == study]
     others = {study_of(name) for module in own for name in imported(module)}
     assert others <= {None, study, *needs}
+    rules = Path(studies.__file__).with_name(study) / "rules.smk"
+    sources = rules.read_text() if rules.is_file() else ""
+    assert set(re.findall(r"\bstudies\.(\w+)", sources)) <= {"FOLDER", "base", study, *needs}
+
+
+def test_a_study_that_is_needed_and_missing_is_named(monkeypatch):
+    kept = [name for name in studies.names() if name != "recordings"]
+    monkeypatch.setattr(studies, "names", lambda: kept)
+    with pytest.raises(UserError, match="no folder studies/recordings, which studies/sounds needs"):
+        studies.rules()
+    monkeypatch.setattr(studies, "names", lambda: [name for name in kept if name != "blocks"])
+    with pytest.raises(UserError, match="no folder studies/blocks, which workflow/report needs"):
+        studies.rules()
+
+
+def test_commands_of_studies_have_names_of_their_own():
+    modules = [import_module(f"studies.{study}") for study in studies.names()]
+    named = [
+        name
+        for module in modules
+        for name in [*getattr(module, "COMMANDS", ()), *getattr(module, "PAGES", ())]
+    ]
+    assert sorted(named) == sorted(studies.commands())
 
 
 def test_nothing_of_the_product_imports_a_study():

@@ -28,7 +28,8 @@ class Command:
 
     module: str
     """Has `add_arguments(parser)` and `run(arguments)`, which returns an exit status or None for
-    success; its docstring is the command's description, `EXAMPLES` ends its help."""
+    success; its docstring is the command's description, `EXAMPLES` ends its help. If it has the
+    name `FURTHER`, arguments that it does not know are in `arguments.further`, in their order."""
     summary: str
     """What it does, for the list of commands."""
     ranks: bool = False
@@ -82,8 +83,12 @@ def run_program(
 
     @on_all_ranks()
     def parse() -> None:
-        chosen.append(_parser(name, description, commands, unlisted, given).parse_args(given))
-        command = chosen[0].command
+        parser = _parser(name, description, commands, unlisted, given)
+        arguments, arguments.further = parser.parse_known_args(given)
+        command = arguments.command
+        if arguments.further and not hasattr(_module(everything[command]), "FURTHER"):
+            parser.error(f"unrecognized arguments: {' '.join(arguments.further)}")
+        chosen.append(arguments)
         if comm is not None and not everything[command].ranks:
             chosen.clear()
             raise UserError(
@@ -96,11 +101,15 @@ def run_program(
     if comm is not None and not chosen:
         comm.Barrier()  # nobody ends before the first rank has told what is wrong
     for arguments in chosen:
-        module = import_module(everything[arguments.command].module)
+        module = _module(everything[arguments.command])
         status = exit_status.run(
             f"{name} {arguments.command}", partial(module.run, arguments), comm
         )
     return status
+
+
+def _module(command: Command) -> Any:
+    return import_module(command.module)
 
 
 def _parser(
@@ -115,7 +124,7 @@ def _parser(
     parser.add_argument("--version", action="version", version=f"Carillon {__version__}")
     parts = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for each, command in {**commands, **unlisted}.items():
-        module = import_module(command.module) if words and words[0] == each else None
+        module = _module(command) if words and words[0] == each else None
         listed: dict[str, Any] = {"help": command.summary} if each in commands else {}
         part = parts.add_parser(
             each,

@@ -17,7 +17,7 @@ from typing import Any
 import h5py
 from llvmlite import binding
 
-from carillon import __version__
+from carillon import ROOMS, __version__
 from carillon.processes.blas import blas_name
 from carillon.processes.threads import allowed_cores
 
@@ -36,19 +36,25 @@ _PACKAGES = (
 
 @cache
 def commit() -> str:
-    """Commit of the checkout the packages run from, `-dirty` if it has changes; else 'unknown'."""
+    """Commit of the checkout the packages run from; 'unknown' without one.
+
+    It ends in `-dirty` if files differ from it, or if rooms hold files that git does not track.
+    """
+    described = _git("describe", "--always", "--dirty", "--abbrev=12", "--exclude=*")
+    if described is None:
+        return "unknown"
+    added = _git("ls-files", "--others", "--exclude-standard", "--", *ROOMS)
+    return f"{described}-dirty" if added and not described.endswith("-dirty") else described
+
+
+def _git(*words: str) -> str | None:
+    """What git prints of the checkout, None if it fails."""
     root = Path(__file__).resolve().parents[2]
     try:
-        described = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],
-            cwd=root,
-            capture_output=True,
-            text=True,
-            timeout=10,
-        )
+        done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, timeout=10)
     except (OSError, subprocess.TimeoutExpired):
-        return "unknown"
-    return described.stdout.strip() if described.returncode == 0 else "unknown"
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
 
 
 @cache

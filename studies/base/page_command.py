@@ -1,6 +1,7 @@
-"""Make the page of a study by its rules; what stands behind the name goes to Snakemake.
+"""Make the page of a study by its rules; all options but --cores go to Snakemake.
 
 It is short for `snakemake -s $(carillon rules) --cores all NAME ...`, run in the present folder.
+Results are made there, too, which may take hours: `-n` shows what would run.
 """
 
 import argparse
@@ -10,19 +11,19 @@ import sys
 from workflow import settings
 
 EXAMPLES = """examples:
-  study claims
+  study claims -n
   study figures --configfile paper.yaml --cores 8
 """
+FURTHER = "options of Snakemake"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.add_argument("--cores", default="all", help="cores to use (default: all)")
-    parser.add_argument("snakemake", nargs=argparse.REMAINDER, help="further options of Snakemake")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the rules; returns the exit status of Snakemake."""
     command = [sys.executable, "-m", "snakemake", "-s", str(settings.FOLDER / "Snakefile")]
-    command += ["--cores", arguments.cores, arguments.command, *arguments.snakemake]
+    command += ["--cores", arguments.cores, arguments.command, *arguments.further]
     return subprocess.run(command).returncode

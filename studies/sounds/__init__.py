@@ -1,6 +1,6 @@
 """Examples of sound design, each with a page: `snakemake sounds`."""
 
-NEEDS = ("recordings",)
+NEEDS = ("design", "recordings")
 
 PAGES = {
     "sounds": "examples of sound design",
