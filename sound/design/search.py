@@ -17,13 +17,10 @@ from sound.design.tasks import SearchStep, Task, Trial
 
 FEWEST = 2
 """Least number of evaluations of a descent: that of its start, and one of a step."""
-
-
 LEAST_LEG = 8
 """Least number of evaluations of a leg: two of each of four descents side by side."""
 LEAST_LEG_SECONDS = 2.0
 """Least duration of a leg, over the time that is reserved for the check after it."""
-
 ENDLESS_SECONDS = 60.0
 """Duration [s] that legs are shares of in a search without a budget."""
 

@@ -31,11 +31,9 @@ FIRST_SHARE, LARGEST_SHARE = 0.2, 0.35
 any."""
 LONGER = 1.5
 """Ratio of the shares of successive legs."""
-
 WORTHWHILE = 0.5
 """Greatest ratio of the fine costs after and before a coarse leg, for the next leg to be coarse,
 too; otherwise it is on the fine solid."""
-
 MET_CENTS = 5.0
 """Root mean square distance of fine frequencies from their targets that is hardly audible
 [cents]."""

@@ -17,7 +17,6 @@ from studio.session.document import Target
 LISTENING_SECONDS = 180.0
 """Longest time to find the modes of a clip."""
 
-
 _NOTHING: dict[str, Any] = {
     "seconds": None,
     "rate_hz": None,

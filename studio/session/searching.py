@@ -14,7 +14,6 @@ from studio.session.document import Material
 MOST_ROWS = 4000
 """Most rows of a search's history that is shown; of more, every second one is left out."""
 
-
 _COUNTED = ("cost", "evaluations")
 """Keys of a row that make it news; time alone is not."""
 

@@ -170,11 +170,8 @@ def _target(specifier: str, importer: Path, places: dict[str, str]) -> Path | No
     if specifier.startswith((".", "/")):
         path = importer.parent / specifier
     else:
-        begins = [
-            name
-            for name in places
-            if specifier == name or name.endswith("/") and specifier.startswith(name)
-        ]
+        folders = [name for name in places if name.endswith("/") and specifier.startswith(name)]
+        begins = [specifier] if specifier in places else folders
         if not begins:
             return None
         begin = max(begins, key=len)

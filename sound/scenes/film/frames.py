@@ -21,7 +21,6 @@ SHEEN = 0.14
 """Brightness of the highlights, added to the diffuse light."""
 SHARPNESS = 40.0
 """Exponent of the highlights (Blinn and Phong)."""
-
 EDGE_PLACES = np.array([[-0.375, -0.125], [0.125, -0.375], [0.375, 0.125], [-0.125, 0.375]])
 """Positions of the rays through a pixel at an edge [pixels from its centre]."""
 EDGE_CONTRAST = 6

@@ -22,7 +22,6 @@ SUNLIGHT = np.array([1.0, 0.96, 0.90], np.float32) * 0.80
 """Light that a white surface facing the sun reflects of it."""
 SKYLIGHT = np.array([0.84, 0.91, 1.0], np.float32) * 0.36
 """Light that a white surface facing up reflects of the sky."""
-
 TILES = np.array([[0.82, 0.82, 0.81], [0.72, 0.72, 0.71]], np.float32)
 """Reflectances of the two kinds of tiles on the ground."""
 TILES_AHEAD = 9.0
@@ -33,12 +32,10 @@ ABOVE_HORIZON = np.array([-0.38, -0.30, -0.18], np.float32)
 """Light of the sky at the zenith minus that at the horizon."""
 FADING = 4.0
 """Distance at which the ground fades into the horizon, over that of the camera's target."""
-
 SUN_SIDE, SKY_SIDE = 4, 6
 """Sides of the squares of pixels that together sample a light, a direction in each pixel."""
 GROUND_SIDE = 4
 """Number of rays along each side of a pixel of the ground without shadows."""
-
 UP = np.array([0.0, 0.0, 1.0], np.float32)
 """Unit vector upwards."""
 GOLDEN_ANGLE = np.pi * (3.0 - 5.0**0.5)
