@@ -116,26 +116,19 @@ class Mixture:
 
     Means and contrasts are those of the scale of `Moduli`: arithmetic for uniform moduli, of
     logarithms for log-uniform ones.
-
-    Attributes
-    ----------
-    void
-        Share of blocks with at least one void cell (never all eight).
-    uniform
-        Share whose filled cells all have the mean of the block that was drawn.
-    two_phase
-        Share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or up to
-        what the range allows. Log-uniform: the softer one is log-uniform between the range's lower
-        end and the stiffer one.
-    blended
-        Share pulled towards the block's mean, the contrast log-uniform down to `contrast`. The rest
-        fills the hypercube as it is.
     """
 
     void: float = 0.5
+    """Share of blocks with at least one void cell (never all eight)."""
     uniform: float = 0.02
+    """Share whose filled cells all have the mean of the block that was drawn."""
     two_phase: float = 0.13
+    """Share with two values. Uniform: their ratio is log-uniform up to `phase_ratio`, or up to what
+    the range allows. Log-uniform: the softer one is log-uniform between the range's lower end and
+    the stiffer one."""
     blended: float = 0.35
+    """Share pulled towards the block's mean, the contrast log-uniform down to `contrast`. The rest
+    fills the hypercube as it is."""
     phase_ratio: float = 1e3
     contrast: float = 1e-3
 

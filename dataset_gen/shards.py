@@ -40,26 +40,18 @@ _OF_ONE_KIND = {"objective": "objective", "poisson": "Poisson's ratio", "code": 
 
 @dataclass(frozen=True)
 class Shard:
-    """Samples with their fits, of a whole shard or of a piece of one.
-
-    Attributes
-    ----------
-    settings
-        What decides about the rows.
-    fine, coarse : (n, 8)
-        Moduli [GPa].
-    residual, converged : (n,)
-        See `dataset_gen.objectives.Fits`.
-    provenance
-        Of the shard, by name.
-    """
+    """Samples with their fits, of a whole shard or of a piece of one."""
 
     settings: Settings
+    """What decides about the rows."""
     fine: Array
     coarse: Array
+    """(n, 8) moduli [GPa]."""
     residual: Array
     converged: Flags
+    """(n,) see `dataset_gen.objectives.Fits`."""
     provenance: dict[str, Any]
+    """Of the shard, by name."""
 
     @property
     def objective(self) -> str:

@@ -31,21 +31,14 @@ RECORD = FEATURES + 3
 
 @dataclass(frozen=True)
 class Forests:
-    """Two forests, all trees in one set of arrays.
-
-    Attributes
-    ----------
-    roots : (2, trees, 128)
-        Root nodes of the void and the filled forest, one for each void pattern.
-    nodes : (nodes,)
-        Of type `forests.layout.NODE`; links lead to later nodes only.
-    leaves : (leaves, 10)
-        Slopes of the seven features, constant, bounds of the answer.
-    """
+    """Two forests, all trees in one set of arrays."""
 
     roots: NDArray[np.int32]
+    """(2, trees, 128) root nodes of the void and the filled forest, one for each void pattern."""
     nodes: NDArray[Any]
+    """(nodes,) of type `forests.layout.NODE`; links lead to later nodes only."""
     leaves: NDArray[np.float32]
+    """(leaves, 10) slopes of the seven features, constant, bounds of the answer."""
 
     @property
     def trees(self) -> int:
@@ -65,26 +58,18 @@ class Forests:
 
 @dataclass(frozen=True)
 class Model:
-    """Everything a coarsening needs to know.
-
-    Attributes
-    ----------
-    objective, poisson
-        Objective and Poisson's ratio of the fits.
-    transform
-        Of the features and the target, one of `forests.scaling.TRANSFORMS`.
-    scores
-        On samples that were held out, by name.
-    provenance
-        Of the training, by name.
-    """
+    """Everything a coarsening needs to know."""
 
     objective: str
     poisson: float
+    """Objective and Poisson's ratio of the fits."""
     transform: str
+    """Of the features and the target, one of `forests.scaling.TRANSFORMS`."""
     forests: Forests
     scores: dict[str, float]
+    """On samples that were held out, by name."""
     provenance: dict[str, Any]
+    """Of the training, by name."""
 
     @property
     def nbytes(self) -> int:

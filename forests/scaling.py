@@ -41,24 +41,16 @@ Features = NDArray[np.float32]
 
 
 class PreparedBlocks(NamedTuple):
-    """Blocks as the forests see them.
-
-    Attributes
-    ----------
-    features : (n, 8 origins, 7) float32
-        Of e'2..e'8.
-    pattern : (n, 8) uint8
-        See `PATTERNS`.
-    scale : (n, 8)
-        In the unit of the moduli.
-    filled : (n, 8) bool
-        Whether the origin is filled.
-    """
+    """Blocks as the forests see them."""
 
     features: Features
+    """(n, 8 origins, 7) float32: of e'2..e'8."""
     pattern: NDArray[np.uint8]
+    """(n, 8) uint8: see `PATTERNS`."""
     scale: Array
+    """(n, 8) in the unit of the moduli."""
     filled: Flags
+    """(n, 8) bool: whether the origin is filled."""
 
 
 @numba.njit(inline="always")

@@ -26,21 +26,14 @@ _DATA = (".json", ".css", ".j2", ".yaml")
 
 
 class Source(NamedTuple):
-    """A source file.
-
-    Attributes
-    ----------
-    names
-        What it imports, with the packages these lie in; some may be no modules.
-    data
-        Names of data files that it mentions.
-    digest
-        SHA-256 of its syntax tree without docstrings and help texts.
-    """
+    """A source file."""
 
     names: Sequence[str]
+    """What it imports, with the packages these lie in; some may be no modules."""
     data: Sequence[str]
+    """Names of data files that it mentions."""
     digest: str
+    """SHA-256 of its syntax tree without docstrings and help texts."""
 
 
 _asked: set[str] = set()

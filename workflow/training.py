@@ -17,19 +17,13 @@ TRAINING = (
 
 @dataclass(frozen=True)
 class Training:
-    """Data and training of one model.
-
-    Attributes
-    ----------
-    dataset, forests
-        Its sections of the configuration.
-    poisson
-        Poisson's ratio of the blocks.
-    """
+    """Data and training of one model."""
 
     dataset: Mapping[str, Any]
     forests: Mapping[str, Any]
+    """Its sections of the configuration."""
     poisson: float
+    """Poisson's ratio of the blocks."""
 
     @property
     def distributions(self) -> list[str]:

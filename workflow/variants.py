@@ -9,25 +9,17 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to compute the spectrum of a model.
-
-    Attributes
-    ----------
-    label
-        Name for people, short enough for a table's head.
-    coarsen, method
-        Options of `solver modes`.
-    corrected
-        Whether error correction runs until its tolerance is met; plain HCMS otherwise.
-    role
-        What the run is there for, in a few words.
-    """
+    """One way to compute the spectrum of a model."""
 
     label: str
+    """Name for people, short enough for a table's head."""
     coarsen: str
     method: str
+    """Options of `solver modes`."""
     corrected: bool
+    """Whether error correction runs until its tolerance is met; plain HCMS otherwise."""
     role: str
+    """What the run is there for, in a few words."""
 
 
 TRUTH = "truth"

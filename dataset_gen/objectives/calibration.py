@@ -24,27 +24,19 @@ FILE = "calibration.json"
 
 @dataclass(frozen=True)
 class Calibration:
-    """What `calibrated` multiplies the computed moduli with.
-
-    Attributes
-    ----------
-    factors : (256, 8)
-        Factors on the moduli of a block of one material, by void pattern; rows of patterns that are
-        not the least of their class under the cube's symmetries are not used.
-    galerkin_filled, galerkin_void
-        Exponent of Galerkin's answer to contrast in blocks without and with void cells; the rest is
-        the answer of `oversampled`.
-    lumped_share
-        Share of row-sum lumped mass in coarse cells whose octants are all filled.
-    provenance
-        How the constants were found.
-    """
+    """What `calibrated` multiplies the computed moduli with."""
 
     factors: Array
+    """(256, 8) factors on the moduli of a block of one material, by void pattern; rows of patterns
+    that are not the least of their class under the cube's symmetries are not used."""
     galerkin_filled: float
     galerkin_void: float
+    """Exponent of Galerkin's answer to contrast in blocks without and with void cells; the rest is
+    the answer of `oversampled`."""
     lumped_share: float
+    """Share of row-sum lumped mass in coarse cells whose octants are all filled."""
     provenance: dict[str, Any]
+    """How the constants were found."""
 
 
 def parse(content: Mapping[str, Any]) -> Calibration:

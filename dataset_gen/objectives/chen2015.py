@@ -56,19 +56,13 @@ WEIGHT = 0.02
 
 
 class Corners(NamedTuple):
-    """Corners of a void pattern, on the active nodes in the order of elimination.
-
-    Attributes
-    ----------
-    loads : flat (a, 18)
-        C^T Z: forces dual to the straining motions Z of the corners.
-    strains : flat (48, 18)
-        Strains of the coarse element in its straining motions.
-    """
+    """Corners of a void pattern, on the active nodes in the order of elimination."""
 
     block: FreeBlock
     loads: Array
+    """flat (a, 18): C^T Z: forces dual to the straining motions Z of the corners."""
     strains: Array
+    """flat (48, 18): strains of the coarse element in its straining motions."""
 
     def flops(self) -> int:
         """Floating-point operations of one block's normal equations."""

@@ -36,47 +36,31 @@ from dataset_gen.objectives.patterns import corner_strains, pattern_of, strainin
 
 
 class Coarse(NamedTuple):
-    """Coarse element of a void pattern.
-
-    Attributes
-    ----------
-    basis : flat (a, 18)
-        V on the active nodes in the order of elimination.
-    stiffness
-        The lower tiles of sum_q E_q S_q^T S_q.
-    strains : flat (18, 48)
-        All S_q^T.
-    """
+    """Coarse element of a void pattern."""
 
     block: FreeBlock
     basis: Array
+    """flat (a, 18): v on the active nodes in the order of elimination."""
     stiffness: Sum
+    """The lower tiles of sum_q E_q S_q^T S_q."""
     strains: Array
+    """flat (18, 48): all S_q^T."""
 
 
 class CoarseResponse(NamedTuple):
-    """Answer of the coarse elements in the lanes.
-
-    Attributes
-    ----------
-    weights : (9)
-        Moduli E.
-    factor
-        Lower tiles of L with B^-1 = L L^T.
-    flexibility : (18, 18)
-        B.
-    scaled : (18, 48)
-        L^-1 S_q^T sqrt(E_q).
-    strained : (18, 48)
-        B S_q^T sqrt(E_q); the derivative of B in log E_q is -R_q^T R_q with R_q^T columns 6 q to 6
-        q + 5.
-    """
+    """Answer of the coarse elements in the lanes."""
 
     weights: Array
+    """(9) moduli E."""
     factor: Array
+    """Lower tiles of L with B^-1 = L L^T."""
     flexibility: Array
+    """(18, 18) B."""
     scaled: Array
+    """(18, 48) L^-1 S_q^T sqrt(E_q)."""
     strained: Array
+    """(18, 48) b S_q^T sqrt(E_q); the derivative of B in log E_q is -R_q^T R_q with R_q^T columns 6
+    q to 6 q + 5."""
 
 
 @cache

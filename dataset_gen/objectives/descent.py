@@ -39,36 +39,25 @@ SLACK = 1e-12
 
 
 class DescentState(NamedTuple):
-    """State of the lanes: where they are, what they try, and the objective at both.
-
-    Attributes
-    ----------
-    bounds : (2)
-        Of log E, in all lanes.
-    x, trial : (8)
-        Logarithms of the moduli.
-    here, there
-        At x and at trial, one after the other: value (1), gradient (8), the Hessian of Gauss and
-        Newton (8, 8), and what it lacks (8, 8); of both only the lower half.
-    scale : (1)
-        Size of the objective at E = 0.
-    damping : (1)
-        Share of the Hessian's diagonal that is added to it.
-    left : (1)
-        Length of the step of Gauss and Newton.
-    active : (1)
-        1 until the lane has converged, then 0.
-    """
+    """State of the lanes: where they are, what they try, and the objective at both."""
 
     bounds: Array
+    """(2) of log E, in all lanes."""
     x: Array
     trial: Array
+    """(8) logarithms of the moduli."""
     here: Array
     there: Array
+    """At x and at trial, one after the other: value (1), gradient (8), the Hessian of Gauss and
+    Newton (8, 8), and what it lacks (8, 8); of both only the lower half."""
     scale: Array
+    """(1) size of the objective at E = 0."""
     damping: Array
+    """(1) share of the Hessian's diagonal that is added to it."""
     left: Array
+    """(1) length of the step of Gauss and Newton."""
     active: Array
+    """(1) 1 until the lane has converged, then 0."""
 
 
 VALUE, GRADIENT, HESSIAN, CURVATURE, DERIVATIVES = 0, 1, 9, 73, 137

@@ -30,66 +30,43 @@ class Links(NamedTuple):
 
 
 class FactorStructure(NamedTuple):
-    """Structure of a Cholesky factor L whose tiles are stored row by row.
-
-    Attributes
-    ----------
-    rows
-        Tiles left of the diagonal in each row, by ascending node.
-    columns
-        Tiles below the diagonal in each column, by ascending node.
-    diagonal : (n,)
-        Tile on the diagonal of each row.
-    start : (n + 1,)
-        Where the updates by each column begin: column k takes L_ik L_jk^T from all ij.
-    updated, left, right : (p,)
-        The tiles ij, L_ik and L_jk.
-    """
+    """Structure of a Cholesky factor L whose tiles are stored row by row."""
 
     rows: Links
+    """Tiles left of the diagonal in each row, by ascending node."""
     columns: Links
+    """Tiles below the diagonal in each column, by ascending node."""
     diagonal: Index
+    """(n,) tile on the diagonal of each row."""
     start: Index
+    """(n + 1,) where the updates by each column begin: column k takes L_ik L_jk^T from all ij."""
     updated: Index
     left: Index
     right: Index
+    """(p,) the tiles ij, L_ik and L_jk."""
 
 
 class Sum(NamedTuple):
-    """Tiles that are sums of fixed tiles, each times one of the block's weights.
-
-    Attributes
-    ----------
-    start : (t + 1,)
-        Where the terms of each tile begin.
-    weight : (s,)
-        Number of the weight of each term.
-    values : (9 s,)
-        Its fixed tile.
-    """
+    """Tiles that are sums of fixed tiles, each times one of the block's weights."""
 
     start: Index
+    """(t + 1,) where the terms of each tile begin."""
     weight: Index
+    """(s,) number of the weight of each term."""
     values: Array
+    """(9 s,) its fixed tile."""
 
 
 @dataclass(frozen=True)
 class SymbolicFactorisation:
-    """Unknowns of a void pattern in the order of elimination.
-
-    Attributes
-    ----------
-    dofs : (a,)
-        Degrees of freedom of the active nodes among the block's 81, in order.
-    linked : (n, n)
-        Whether two of the nodes touch a common filled cell.
-    filled : (n, n)
-        Whether the factor has a tile between them.
-    """
+    """Unknowns of a void pattern in the order of elimination."""
 
     dofs: Index
+    """(a,) degrees of freedom of the active nodes among the block's 81, in order."""
     linked: Flags
+    """(n, n) whether two of the nodes touch a common filled cell."""
     filled: Flags
+    """(n, n) whether the factor has a tile between them."""
     factor: FactorStructure
 
 

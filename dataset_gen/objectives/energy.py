@@ -62,19 +62,13 @@ LOG_RIDGE = 1e-6
 
 
 class Fine(NamedTuple):
-    """Fine flexibility of the blocks in the lanes.
-
-    Attributes
-    ----------
-    flexibility : (18, 18)
-        V^T K^+ V.
-    norms : (3)
-        Trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no coarse
-        element can answer, twice |K^+|^2 - |V^T K^+ V|^2.
-    """
+    """Fine flexibility of the blocks in the lanes."""
 
     flexibility: Array
+    """(18, 18) V^T K^+ V."""
     norms: Array
+    """(3) trace of K^+, mean square of the energies f^T K^+ f, and the part of it that no coarse
+    element can answer, twice |K^+|^2 - |V^T K^+ V|^2."""
 
 
 @compiled

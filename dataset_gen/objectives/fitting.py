@@ -23,21 +23,14 @@ def module_of(objective: str) -> ModuleType:
 
 
 class Fits(NamedTuple):
-    """Result of `fit`.
-
-    Attributes
-    ----------
-    moduli : (n, 8)
-        Coarse moduli E, in the unit of the fine ones, positive.
-    residual : (n,)
-        Root of the objective relative to its value for E = 0.
-    converged : (n,)
-        Whether the minimiser settled.
-    """
+    """Result of `fit`."""
 
     moduli: Array
+    """(n, 8) coarse moduli E, in the unit of the fine ones, positive."""
     residual: Array
+    """(n,) root of the objective relative to its value for E = 0."""
     converged: Flags
+    """(n,) whether the minimiser settled."""
 
 
 def _require_blocks(young: Array) -> None:

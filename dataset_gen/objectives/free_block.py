@@ -37,19 +37,13 @@ from dataset_gen.objectives.patterns import pattern_of
 
 
 class FreeBlock(NamedTuple):
-    """Tables of a void pattern.
-
-    Attributes
-    ----------
-    stiffness
-        K with springs of the mean modulus.
-    null : flat (a, k)
-        Orthonormal motions without strain, zero columns up to a multiple of six.
-    """
+    """Tables of a void pattern."""
 
     factor: FactorStructure
     stiffness: Sum
+    """K with springs of the mean modulus."""
     null: Array
+    """flat (a, k): orthonormal motions without strain, zero columns up to a multiple of six."""
 
 
 @cache

@@ -42,22 +42,15 @@ LOADS = 24
 
 
 class InertialTables(NamedTuple):
-    """Loads of a void pattern, on the active nodes in the order of elimination.
-
-    Attributes
-    ----------
-    loads : flat (a, 24)
-        Inertial forces of the trilinear motions.
-    to_corners : flat (18, a)
-        Straining motions nearest to nodal displacements.
-    strains : flat (48, 18)
-        Strains of the coarse element in its straining motions.
-    """
+    """Loads of a void pattern, on the active nodes in the order of elimination."""
 
     block: FreeBlock
     loads: Array
+    """flat (a, 24): inertial forces of the trilinear motions."""
     to_corners: Array
+    """flat (18, a): straining motions nearest to nodal displacements."""
     strains: Array
+    """flat (48, 18): strains of the coarse element in its straining motions."""
 
     def flops(self) -> int:
         """Floating-point operations of one block's normal equations."""

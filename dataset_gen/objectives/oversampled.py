@@ -68,29 +68,20 @@ PATCH_NODES = np.array([[x, y, z] for z in range(5) for y in range(5) for x in r
 
 
 class Patch(NamedTuple):
-    """The patch of a void pattern, on the active nodes in the order of elimination.
-
-    Attributes
-    ----------
-    held
-        Stiffness of the patch from each octant.
-    loads : (a, 18)
-        Loads of the prescribed fields from each octant.
-    links, own
-        Where and what the block's own stiffness is, half of it on the diagonal.
-    to_corners : flat (18, a)
-        Straining motions nearest to nodal displacements.
-    strains : flat (48, 18)
-        Strains of the coarse element in its straining motions.
-    """
+    """The patch of a void pattern, on the active nodes in the order of elimination."""
 
     factor: FactorStructure
     held: Sum
+    """Stiffness of the patch from each octant."""
     loads: Sum
+    """(a, 18) loads of the prescribed fields from each octant."""
     links: Links
     own: Sum
+    """Where and what the block's own stiffness is, half of it on the diagonal."""
     to_corners: Array
+    """flat (18, a): straining motions nearest to nodal displacements."""
     strains: Array
+    """flat (48, 18): strains of the coarse element in its straining motions."""
 
     def flops(self) -> int:
         """Floating-point operations of one block's normal equations."""

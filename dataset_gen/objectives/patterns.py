@@ -33,36 +33,24 @@ NULL_TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class VoidPattern:
-    """Matrices of the block's active nodes (those that touch a filled cell) for unit moduli.
-
-    Attributes
-    ----------
-    cells : (f,)
-        Indices of the filled cells.
-    dofs : (a,)
-        Degrees of freedom of the active nodes among the block's 81.
-    stiffness : (f, a * a)
-        Flattened K_j of the filled cells, fine edge 1.
-    mass : (a, a)
-        Consistent mass of the filled cells, unit density.
-    interpolation : (a, 24)
-        Rows of the trilinear prolongation, P_a.
-    to_corners : (24, a)
-        Its pseudo-inverse: the trilinear motion nearest to nodal displacements.
-    rigid : (a, 6)
-        Orthonormal rigid motions.
-    null : (a, k)
-        Orthonormal motions without strain; k > 6 where cells hinge on edges or corners.
-    """
+    """Matrices of the block's active nodes (those that touch a filled cell) for unit moduli."""
 
     cells: Index
+    """(f,) indices of the filled cells."""
     dofs: Index
+    """(a,) degrees of freedom of the active nodes among the block's 81."""
     stiffness: Array
+    """(f, a * a) flattened K_j of the filled cells, fine edge 1."""
     mass: Array
+    """(a, a) consistent mass of the filled cells, unit density."""
     interpolation: Array
+    """(a, 24) rows of the trilinear prolongation, P_a."""
     to_corners: Array
+    """(24, a) its pseudo-inverse: the trilinear motion nearest to nodal displacements."""
     rigid: Array
+    """(a, 6) orthonormal rigid motions."""
     null: Array
+    """(a, k) orthonormal motions without strain; k > 6 where cells hinge on edges or corners."""
 
     def positions(self, dofs: Index) -> Index:
         """Where degrees of freedom of the block are among the active ones."""

@@ -60,18 +60,12 @@ FORCES = (0, 0, 0, 1)
 
 
 class Loaded(NamedTuple):
-    """Forces on a block, `LANES` to a column.
-
-    Attributes
-    ----------
-    felt : (18, columns)
-        What the coarse element feels of them, V^T f.
-    energies : (columns)
-        Fine energies f^T K^+ f.
-    """
+    """Forces on a block, `LANES` to a column."""
 
     felt: Array
+    """(18, columns) what the coarse element feels of them, V^T f."""
     energies: Array
+    """(columns) fine energies f^T K^+ f."""
 
 
 class Room(NamedTuple):

@@ -28,39 +28,26 @@ ANCESTOR_ROWS = 64
 
 @dataclass(frozen=True)
 class Leaves:
-    """Linear functions of one tree's leaves.
-
-    Attributes
-    ----------
-    coefficients : (leaves, 8)
-        Slopes of the seven features and the constant.
-    low, high : (leaves,)
-        Range of the targets seen in the leaf, which bounds its answers.
-    """
+    """Linear functions of one tree's leaves."""
 
     coefficients: Array
+    """(leaves, 8) slopes of the seven features and the constant."""
     low: Array
     high: Array
+    """(leaves,) range of the targets seen in the leaf, which bounds its answers."""
 
 
 @dataclass(frozen=True)
 class Sums:
-    """What the rows seen so far mean for each leaf or node.
-
-    Attributes
-    ----------
-    moments : (n, 45)
-        See `moments`.
-    rows : (n,)
-        How many.
-    low, high : (n,)
-        Range of their targets.
-    """
+    """What the rows seen so far mean for each leaf or node."""
 
     moments: Array
+    """(n, 45) see `moments`."""
     rows: Index
+    """(n,) how many."""
     low: Array
     high: Array
+    """(n,) range of their targets."""
 
     @classmethod
     def nothing(cls, count: int) -> Sums:

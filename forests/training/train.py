@@ -183,22 +183,15 @@ def _ahead(pool: ThreadPoolExecutor, items: Iterator[T]) -> Iterator[T]:
 
 
 class Trained(NamedTuple):
-    """Both steps' result.
-
-    Attributes
-    ----------
-    trees, leaves
-        By tree number.
-    held_out
-        Samples that were not trained on.
-    facts
-        Seconds, rows, ranks and workers by name.
-    """
+    """Both steps' result."""
 
     trees: dict[int, Tree]
     leaves: dict[int, Leaves]
+    """By tree number."""
     held_out: Samples
+    """Samples that were not trained on."""
     facts: dict[str, Any]
+    """Seconds, rows, ranks and workers by name."""
 
 
 def train_trees(

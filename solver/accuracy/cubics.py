@@ -44,18 +44,12 @@ out: hardly any of it is inside."""
 
 @dataclass(frozen=True)
 class CubicSurplus:
-    """What cubic functions would add.
-
-    Attributes
-    ----------
-    gains : (k,)
-        By which they would lower the eigenvalues [rad^2/s^2].
-    shares : (c, k)
-        Strain energy of what they add in each cell, twice.
-    """
+    """What cubic functions would add."""
 
     gains: Array
+    """(k,) by which they would lower the eigenvalues [rad^2/s^2]."""
     shares: Array
+    """(c, k) strain energy of what they add in each cell, twice."""
 
 
 def cubic_surplus(model: FiniteCellModel, values: Array, modes: Array) -> CubicSurplus:

@@ -29,21 +29,14 @@ MOST_LOST = 0.9
 
 @dataclass(frozen=True)
 class CellErrors:
-    """Expected errors of the frequencies of finite cells.
-
-    Attributes
-    ----------
-    errors
-        Of the frequencies; positive, since they are too high.
-    shares : (c,)
-        Each cell's share in them, root mean square over the modes.
-    factors : (c,)
-        By which dividing the cell would diminish its share.
-    """
+    """Expected errors of the frequencies of finite cells."""
 
     errors: ExpectedErrors
+    """Of the frequencies; positive, since they are too high."""
     shares: Array
+    """(c,) each cell's share in them, root mean square over the modes."""
     factors: Array
+    """(c,) by which dividing the cell would diminish its share."""
 
 
 def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) -> CellErrors:

@@ -21,25 +21,17 @@ ARITHMETIC, HARMONIC = 1.0, -1.0
 
 @dataclass(frozen=True)
 class PlacedMaterial:
-    """Young's modulus at any place, from the voxels of a lattice.
-
-    Attributes
-    ----------
-    lattice
-        Where the voxels are.
-    young : (nx, ny, nz)
-        Their moduli [Pa]; a voxel outside the solid has that of the nearest inside.
-    filled : (nx, ny, nz) bool
-        Which voxels are of the solid.
-    interpolated
-        Whether log moduli are interpolated linearly between the middles of voxels; else a voxel's
-        modulus is that of all places in it.
-    """
+    """Young's modulus at any place, from the voxels of a lattice."""
 
     lattice: Grid
+    """Where the voxels are."""
     young: Array
+    """(nx, ny, nz) their moduli [Pa]; a voxel outside the solid has that of the nearest inside."""
     filled: Flags
+    """(nx, ny, nz) bool: which voxels are of the solid."""
     interpolated: bool
+    """Whether log moduli are interpolated linearly between the middles of voxels; else a voxel's
+    modulus is that of all places in it."""
 
     @classmethod
     def of_voxels(cls, lattice: Grid, mesh: HexMesh, young: Array, interpolated: bool) -> Self:

@@ -49,45 +49,32 @@ FIRST_RESOLUTION = 16
 
 @dataclass
 class Solved:
-    """A solid's modes.
-
-    Attributes
-    ----------
-    solid
-        The solid, at the resolution that was solved.
-    problem, model
-        The discretised solid, and the model of it that was solved; on rank 0, None on the others.
-    achieved
-        Plain values: what is expected of the frequencies' errors; `fine_taken` is why the fine
-        solid was taken for a coarse one, if that is so.
-    """
+    """A solid's modes."""
 
     solid: ProblemOptions
+    """The solid, at the resolution that was solved."""
     problem: Problem | None
     model: Solid | None
+    """The discretised solid, and the model of it that was solved; on rank 0, None on the others."""
     modes: Modes
     achieved: dict[str, Any]
+    """Plain values: what is expected of the frequencies' errors; `fine_taken` is why the fine solid
+    was taken for a coarse one, if that is so."""
 
 
 @dataclass(frozen=True)
 class AccuracyRequest:
-    """How accurate the modes of a solid shall be.
-
-    Attributes
-    ----------
-    accuracy
-        Expected distance from the solid's frequencies down to which the resolution is raised; None
-        to leave it.
-    refine_to
-        Expected error down to which a coarse mesh or finite cells are refined; None to leave them.
-    start
-        Modes file whose refined mesh is begun from.
-    """
+    """How accurate the modes of a solid shall be."""
 
     accuracy: float | None = None
+    """Expected distance from the solid's frequencies down to which the resolution is raised; None
+    to leave it."""
     refine_to: float | None = None
+    """Expected error down to which a coarse mesh or finite cells are refined; None to leave
+    them."""
     estimated: bool = False
     start: str | None = None
+    """Modes file whose refined mesh is begun from."""
 
 
 def solve_solid(

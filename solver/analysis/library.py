@@ -21,29 +21,20 @@ from solver.files.modes_file import frequencies
 
 @dataclass(frozen=True)
 class Solution:
-    """Modes of a solid.
-
-    Attributes
-    ----------
-    eigenvalues, frequencies
-        (k,) [rad^2/s^2] and [Hz], ascending, rigid motions first.
-    modes
-        (n_dofs, k) mass-normalised modes [kg^-1/2], row 3 n + i is node n of the mesh along axis i;
-        None on other ranks than 0.
-    residuals
-        (k,) residual ratios, see `solver.verification.residuals.residual_ratios`.
-    evidence
-        What the solver achieved.
-    seconds
-        Wall time by phase.
-    """
+    """Modes of a solid."""
 
     eigenvalues: Array
     frequencies: Array
+    """(k,) [rad^2/s^2] and [Hz], ascending, rigid motions first."""
     modes: Array | None
+    """(n_dofs, k) mass-normalised modes [kg^-1/2], row 3 n + i is node n of the mesh along axis i;
+    None on other ranks than 0."""
     residuals: Array
+    """(k,) residual ratios, see `solver.verification.residuals.residual_ratios`."""
     evidence: dict[str, Any]
+    """What the solver achieved."""
     seconds: dict[str, float]
+    """Wall time by phase."""
 
 
 def solve(

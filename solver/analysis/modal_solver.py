@@ -209,17 +209,12 @@ def _reporter(visible: bool) -> Callable[[int, float], None] | None:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Partition and symbolic analysis of a mesh, one subdomain a rank.
-
-    Attributes
-    ----------
-    layout, linear
-        Layout of its matrices, and the solver of linear systems with them.
-    """
+    """Partition and symbolic analysis of a mesh, one subdomain a rank."""
 
     local_mesh: LocalMesh
     layout: Layout
     linear: LinearSolver
+    """Layout of its matrices, and the solver of linear systems with them."""
 
     @classmethod
     def of_model(cls, model: Solid | None, comm: MPI.Comm) -> Prepared:

@@ -16,34 +16,24 @@ from solver.linear import Lasting
 
 @dataclass
 class Modes:
-    """Result of a modal analysis.
-
-    Attributes
-    ----------
-    values
-        (k,) eigenvalues [rad^2/s^2], ascending.
-    vectors
-        (local, k) mass-normalised modes, this rank's rows of `system`, row-major.
-    residuals
-        (k,) residual ratios, see `solver.verification.residuals.residual_ratios`.
-    evidence
-        What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
-        peak memory.
-    guard
-        (local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
-        none.
-    inverse
-        Inverse that a warm start makes use of, if there is one.
-    """
+    """Result of a modal analysis."""
 
     values: Array
+    """(k,) eigenvalues [rad^2/s^2], ascending."""
     vectors: Array
+    """(local, k) mass-normalised modes, this rank's rows of `system`, row-major."""
     residuals: Array
+    """(k,) residual ratios, see `solver.verification.residuals.residual_ratios`."""
     system: System
     evidence: dict[str, Any] = field(default_factory=dict)
+    """What the solver achieved: orthogonality, error estimate, steps, inertia, rigid modes, ranks,
+    peak memory."""
     seconds: dict[str, float] = field(default_factory=dict)
     guard: Array | None = None
+    """(local, g) less accurate vectors beyond, which a warm start makes use of; None if there are
+    none."""
     inverse: Lasting | None = None
+    """Inverse that a warm start makes use of, if there is one."""
 
     def start(self) -> Array:
         """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""

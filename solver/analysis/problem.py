@@ -95,26 +95,18 @@ class ProblemOptions:
 
 @dataclass(frozen=True)
 class Problem:
-    """A solid in pieces, with its material, and the model to solve.
-
-    Attributes
-    ----------
-    fine
-        Voxels, those of finite cells too.
-    young
-        (m,) Young's moduli [Pa] of the voxels.
-    model
-        What is solved: the voxels, coarse elements of them, or finite cells.
-    coarsening
-        What the coarse elements rest on, see `Coarsening.record`.
-    """
+    """A solid in pieces, with its material, and the model to solve."""
 
     surface: SolidSurface
     fine: HexMesh
+    """Voxels, those of finite cells too."""
     young: Array
+    """(m,) Young's moduli [Pa] of the voxels."""
     model: Solid
+    """What is solved: the voxels, coarse elements of them, or finite cells."""
     seconds: dict[str, float]
     coarsening: dict[str, str] = field(default_factory=dict)
+    """What the coarse elements rest on, see `Coarsening.record`."""
     covering: Covering | None = None
 
     @property

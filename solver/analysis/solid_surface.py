@@ -12,21 +12,14 @@ from carillon.fem.geometry.size import doubt_unit
 
 @dataclass(frozen=True)
 class SolidSurface:
-    """Triangles around a solid.
-
-    Attributes
-    ----------
-    mesh
-        Path of the file, or `builtin:NAME`.
-    triangles
-        The surface in metres.
-    unit
-        Metres per unit of the mesh's own coordinates.
-    """
+    """Triangles around a solid."""
 
     mesh: str
+    """Path of the file, or `builtin:NAME`."""
     triangles: Surface
+    """The surface in metres."""
     unit: float = 1.0
+    """Metres per unit of the mesh's own coordinates."""
 
     @classmethod
     def read(cls, mesh: str, unit: float = 1.0) -> Self:

@@ -32,27 +32,19 @@ _HALO = 21
 
 @dataclass(frozen=True)
 class Pattern:
-    """Which nodes share an element, for the rows of one rank; the same for any material.
-
-    Attributes
-    ----------
-    indptr, columns
-        Compressed rows of the node graph.  Columns are this rank's nodes, counted from 0, then the
-        ghosts, ascending within a row.
-    entry
-        (c, k, k) entry of every pair of nodes of every cell, -1 if the row is another rank's.
-    ghosts
-        (g,) distributed numbers of the columns that other ranks own, ascending.
-    start, stop
-        Half-open range of this rank's nodes in the distributed order.
-    """
+    """Which nodes share an element, for the rows of one rank; the same for any material."""
 
     indptr: Index
     columns: Index
+    """Compressed rows of the node graph.  Columns are this rank's nodes, counted from 0, then the
+    ghosts, ascending within a row."""
     entry: NDArray[np.int32]
+    """(c, k, k) entry of every pair of nodes of every cell, -1 if the row is another rank's."""
     ghosts: Index
+    """(g,) distributed numbers of the columns that other ranks own, ascending."""
     start: int
     stop: int
+    """Half-open range of this rank's nodes in the distributed order."""
 
     @classmethod
     def of_cells(cls, corners: Index, start: int, stop: int, ghosts: bool = True) -> Pattern:

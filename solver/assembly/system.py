@@ -33,20 +33,14 @@ COLUMNS_GATHERED = 16
 
 @dataclass(frozen=True)
 class Layout:
-    """What the rows of a mesh have to do with each other, whatever the material.
-
-    Attributes
-    ----------
-    pattern, halo
-        Node graph of its rows, and the exchange of rows with its neighbours.
-    coordinates
-        (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
-    """
+    """What the rows of a mesh have to do with each other, whatever the material."""
 
     local_mesh: LocalMesh
     pattern: Pattern
     halo: Halo
+    """Node graph of its rows, and the exchange of rows with its neighbours."""
     coordinates: Array
+    """(local nodes, 3) positions relative to the centroid, in units of the largest half extent."""
     comm: MPI.Comm
 
     @classmethod
@@ -61,34 +55,23 @@ class Layout:
 
 @dataclass(frozen=True)
 class System:
-    """K u = lambda M u over the ranks of `comm`.
-
-    Attributes
-    ----------
-    rows
-        This rank's rows of K [N/m] and M [kg].
-    rigid
-        (local, 6) this rank's rows of the mass-orthonormal rigid motions.
-    mass_rigid
-        (local, 6) M times these.
-    coordinates
-        (local nodes, 3) positions relative to the centroid, in units of the largest half extent.
-    nodes
-        (local nodes,) numbers of this rank's nodes in the mesh.
-    start, stop
-        Half-open range of this rank's rows, one a node.
-    n_dofs
-        Number of unknowns over all ranks.
-    """
+    """K u = lambda M u over the ranks of `comm`."""
 
     rows: NodeRows
+    """This rank's rows of K [N/m] and M [kg]."""
     rigid: Array
+    """(local, 6) this rank's rows of the mass-orthonormal rigid motions."""
     mass_rigid: Array
+    """(local, 6) M times these."""
     coordinates: Array
+    """(local nodes, 3) positions relative to the centroid, in units of the largest half extent."""
     nodes: Index
+    """(local nodes,) numbers of this rank's nodes in the mesh."""
     start: int
     stop: int
+    """Half-open range of this rank's rows, one a node."""
     n_dofs: int
+    """Number of unknowns over all ranks."""
     comm: MPI.Comm
 
     def times_stiffness(self, block: Array) -> Array:

@@ -44,32 +44,22 @@ FIRST_LOOK = 1.25
 
 @dataclass
 class Lanczos:
-    """Outcome of the iteration.
-
-    Attributes
-    ----------
-    values
-        (k,) Ritz values [rad^2/s^2], ascending.
-    vectors
-        (local, k) mass-orthonormal Ritz vectors of their span, row-major.
-    errors
-        (requested,) estimated relative errors of the lowest values; none if there are too few.
-    solves, blocks
-        Number of right-hand sides solved, and of the blocks that they came in.
-    resonant
-        Whether the shift is so close to an eigenvalue that its mode drowns the others: then there
-        are no values and vectors.
-    too_high
-        Whether the iteration ended early since the shift lies beyond most wanted eigenvalues.
-    """
+    """Outcome of the iteration."""
 
     values: Array
+    """(k,) Ritz values [rad^2/s^2], ascending."""
     vectors: Array
+    """(local, k) mass-orthonormal Ritz vectors of their span, row-major."""
     errors: Array
+    """(requested,) estimated relative errors of the lowest values; none if there are too few."""
     solves: int
     blocks: int
+    """Number of right-hand sides solved, and of the blocks that they came in."""
     resonant: bool = False
+    """Whether the shift is so close to an eigenvalue that its mode drowns the others: then there
+    are no values and vectors."""
     too_high: bool = False
+    """Whether the iteration ended early since the shift lies beyond most wanted eigenvalues."""
 
 
 def lanczos(

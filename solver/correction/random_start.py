@@ -27,22 +27,15 @@ ATTEMPTS, OFF_RESONANCE = 3, 0.97
 
 @dataclass(frozen=True)
 class Approximation:
-    """Modes of a coarser model.
-
-    Attributes
-    ----------
-    values
-        (q,) its elastic eigenvalues [rad^2/s^2], which are about those of the fine model.
-    vectors
-        (local, q) its modes on the fine mesh, which are far too stiff there.
-    inverse
-        Inverse of the fine model's K - mu M, used if mu lies amid the wanted eigenvalues; the
-        iteration owns it then.
-    """
+    """Modes of a coarser model."""
 
     values: Array
+    """(q,) its elastic eigenvalues [rad^2/s^2], which are about those of the fine model."""
     vectors: Array
+    """(local, q) its modes on the fine mesh, which are far too stiff there."""
     inverse: Inverse | None = None
+    """Inverse of the fine model's K - mu M, used if mu lies amid the wanted eigenvalues; the
+    iteration owns it then."""
 
 
 @dataclass

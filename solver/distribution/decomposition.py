@@ -21,20 +21,14 @@ class Decomposition:
     """Subdomains and their owners: small, and identical on every rank.
 
     Nodes are numbered by subdomain; the number of a node in this order is its row.
-
-    Attributes
-    ----------
-    tree
-        The merge tree, whose leaves are the subdomains from left to right.
-    owner
-        (parts,) rank of each subdomain; contiguous.
-    offsets
-        (parts + 1,) first row of each subdomain.
     """
 
     tree: MergeTree
+    """The merge tree, whose leaves are the subdomains from left to right."""
     owner: NDArray[np.int32]
+    """(parts,) rank of each subdomain; contiguous."""
     offsets: Index
+    """(parts + 1,) first row of each subdomain."""
 
     @property
     def n_nodes(self) -> int:

@@ -56,34 +56,23 @@ class Cells:
 
 @dataclass(frozen=True)
 class LocalMesh:
-    """What one rank knows of the solid.
-
-    Attributes
-    ----------
-    decomposition
-        Subdomains and owners, the same on every rank.
-    start, stop
-        Half-open range of this rank's rows.
-    cells
-        The cells that touch them, by ascending number.
-    nodes
-        (stop - start,) numbers of this rank's nodes in the mesh.
-    positions
-        (stop - start, 3) their positions [m].
-    numbers
-        (c,) numbers of `cells` in the mesh.
-    origin
-        (3,) position of lattice coordinate (0, 0, 0) [m].
-    """
+    """What one rank knows of the solid."""
 
     decomposition: Decomposition
+    """Subdomains and owners, the same on every rank."""
     start: int
     stop: int
+    """Half-open range of this rank's rows."""
     cells: Cells
+    """The cells that touch them, by ascending number."""
     nodes: Index
+    """(stop - start,) numbers of this rank's nodes in the mesh."""
     positions: Array
+    """(stop - start, 3) their positions [m]."""
     numbers: Index
+    """(c,) numbers of `cells` in the mesh."""
     origin: Array
+    """(3,) position of lattice coordinate (0, 0, 0) [m]."""
 
     @property
     def n_dofs(self) -> int:

@@ -39,29 +39,20 @@ _ROWS_PER_CHUNK = 1 << 20
 
 @dataclass
 class ModesFile:
-    """Contents of a modes file.
-
-    Attributes
-    ----------
-    eigenvalues, frequencies
-        (k,) [rad^2/s^2] and [Hz].
-    modes
-        (n_dofs, k) mass-normalised, unknown 3 n + i is node n along axis i; None if not read.
-    residuals
-        (k,) residual ratios.
-    model
-        The solid that the modes belong to, from which K and M can be assembled again.
-    attributes, provenance
-        Method, tolerances, evidence and timings; origin of the numbers.
-    """
+    """Contents of a modes file."""
 
     eigenvalues: Array
     frequencies: Array
+    """(k,) [rad^2/s^2] and [Hz]."""
     modes: Array | None
+    """(n_dofs, k) mass-normalised, unknown 3 n + i is node n along axis i; None if not read."""
     residuals: Array
+    """(k,) residual ratios."""
     model: Solid
+    """The solid that the modes belong to, from which K and M can be assembled again."""
     attributes: dict[str, Any]
     provenance: dict[str, Any]
+    """Method, tolerances, evidence and timings; origin of the numbers."""
 
     @property
     def mesh(self) -> HexMesh:

@@ -28,25 +28,17 @@ SENT_A_COLUMN = 4
 
 @dataclass
 class Tally:
-    """One rank's part in one phase.
-
-    Attributes
-    ----------
-    messages, bytes
-        Messages sent by this rank and the bytes in them; a broadcast is one to every other rank.
-    flops
-        Floating-point operations of the dense and sparse algebra, estimated.
-    seconds
-        Wall time, waiting included.
-    waiting
-        Wall time [s] spent waiting for messages.
-    """
+    """One rank's part in one phase."""
 
     messages: float = 0.0
     bytes: float = 0.0
+    """Messages sent by this rank and the bytes in them; a broadcast is one to every other rank."""
     flops: float = 0.0
+    """Floating-point operations of the dense and sparse algebra, estimated."""
     seconds: float = 0.0
+    """Wall time, waiting included."""
     waiting: float = 0.0
+    """Wall time [s] spent waiting for messages."""
 
     def sent(self, sent: Sent) -> Sent:
         """Add messages under way; returns them."""

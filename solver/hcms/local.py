@@ -31,20 +31,14 @@ motion's."""
 
 @dataclass(frozen=True)
 class Region:
-    """Some nodes with the cells that touch them: what modes are computed on.
-
-    Attributes
-    ----------
-    lattice
-        (n, 3) integer coordinates of the nodes.
-    pieces
-        (n,) number of the piece that each node belongs to, if there are several.
-    """
+    """Some nodes with the cells that touch them: what modes are computed on."""
 
     pattern: Pattern
     plan: Plan
     lattice: Index
+    """(n, 3) integer coordinates of the nodes."""
     pieces: Index | None
+    """(n,) number of the piece that each node belongs to, if there are several."""
 
     @classmethod
     def of_cells(cls, corners: Index, lattice: Index, steps: int) -> Region:

@@ -33,28 +33,19 @@ ZERO_FRACTION = 1e-10
 
 @dataclass
 class Group:
-    """What a merge needs to know of a group of subdomains.
-
-    Attributes
-    ----------
-    start, stop
-        Half-open range of the group's rows (one a node).
-    values
-        (k,) eigenvalues of the kept modes [rad^2/s^2].
-    boundary
-        (b,) ascending rows that share a cell with a node outside the group.
-    modes
-        (3 b, k) the kept modes there.
-    cells
-        The cells with corners both inside and outside the group.
-    """
+    """What a merge needs to know of a group of subdomains."""
 
     start: int
     stop: int
+    """Half-open range of the group's rows (one a node)."""
     values: Array
+    """(k,) eigenvalues of the kept modes [rad^2/s^2]."""
     boundary: Index
+    """(b,) ascending rows that share a cell with a node outside the group."""
     modes: Array
+    """(3 b, k) the kept modes there."""
     cells: Cells
+    """The cells with corners both inside and outside the group."""
 
     def modes_at(self, rows: Index) -> Array:
         """The kept modes (3 len(rows), k) at some rows of the boundary."""
@@ -90,19 +81,14 @@ class Interface:
 
     The stiffness is K(left + right) - K(left) - K(right), each restricted to its own nodes, and the
     mass is the coupling that the two groups' masses leave out.
-
-    Attributes
-    ----------
-    left, right
-        Ascending rows of the left and of the right group in these cells.
-    stiffness, mass
-        On the unknowns of `left`, then those of `right`.
     """
 
     left: Index
     right: Index
+    """Ascending rows of the left and of the right group in these cells."""
     stiffness: sp.csr_matrix
     mass: sp.csr_matrix
+    """On the unknowns of `left`, then those of `right`."""
 
     def blocks(self, matrix: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
         """Blocks 11, 22 and 21 of either matrix, the last with rows of the right group."""

@@ -54,22 +54,15 @@ def planned_modes(tree: MergeTree, nodes: Sequence[float], keep: int) -> list[in
 
 @dataclass(frozen=True)
 class Schedule:
-    """Ranks of every group.
-
-    Attributes
-    ----------
-    holder
-        (groups,) the rank that makes each group, or owns it if it is a subdomain.
-    teams
-        (merges,) ranks that share each merge's eigenproblem; the holder is the first.
-    crews
-        (merges,) ranks that help the holder with its products, and those that help the rank of the
-        other group with its own.
-    """
+    """Ranks of every group."""
 
     holder: tuple[int, ...]
+    """(groups,) the rank that makes each group, or owns it if it is a subdomain."""
     teams: tuple[tuple[int, ...], ...]
+    """(merges,) ranks that share each merge's eigenproblem; the holder is the first."""
     crews: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+    """(merges,) ranks that help the holder with its products, and those that help the rank of the
+    other group with its own."""
 
     def ranks_of(self, number: int, step: Merge) -> set[int]:
         """All ranks that have a part in merge `step`, of this number."""

@@ -35,18 +35,12 @@ _DOWN = 12
 
 @dataclass
 class Synthesis:
-    """Approximate eigenpairs.
-
-    Attributes
-    ----------
-    values
-        (k,) Ritz values [rad^2/s^2], ascending, on every rank.
-    vectors
-        (local unknowns, k) this rank's rows, row-major.
-    """
+    """Approximate eigenpairs."""
 
     values: Array
+    """(k,) Ritz values [rad^2/s^2], ascending, on every rank."""
     vectors: Array
+    """(local unknowns, k) this rank's rows, row-major."""
     counts: Counts
 
 

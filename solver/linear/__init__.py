@@ -30,21 +30,14 @@ MEMORY_SHARE = 0.8
 
 
 class Inverse(Protocol):
-    """What the error correction needs of a linear solver.
-
-    Attributes
-    ----------
-    shift
-        (K - shift M) is inverted [rad^2/s^2].
-    exact
-        Whether solutions are exact to rounding.
-    negative
-        Eigenvalues below the shift, by Sylvester's law of inertia.
-    """
+    """What the error correction needs of a linear solver."""
 
     shift: float
+    """(K - shift M) is inverted [rad^2/s^2]."""
     exact: bool
+    """Whether solutions are exact to rounding."""
     negative: int
+    """Eigenvalues below the shift, by Sylvester's law of inertia."""
 
     def solve(self, block: Array) -> Array:
         """Solutions for a row-major block of right-hand sides (local unknowns, k); collective."""

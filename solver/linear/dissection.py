@@ -24,29 +24,20 @@ SHORTEST_SIDE = 0.2
 
 @dataclass(frozen=True)
 class Fronts:
-    """Elimination order and fronts of a symmetric matrix of 3x3 node blocks.
-
-    Attributes
-    ----------
-    order
-        (n,) nodes in the order of elimination.
-    first
-        (fronts + 1,) first position eliminated by each front; children come before parents.
-    parent
-        (fronts,) parent of each front, -1 for a root.
-    position
-        (n,) place of each node in `order`.
-    offset, beyond
-        Positions, after the front's own, that each front is coupled to, in compressed form;
-        ascending within a front.
-    """
+    """Elimination order and fronts of a symmetric matrix of 3x3 node blocks."""
 
     order: Index
+    """(n,) nodes in the order of elimination."""
     first: Index
+    """(fronts + 1,) first position eliminated by each front; children come before parents."""
     parent: Index
+    """(fronts,) parent of each front, -1 for a root."""
     position: Index
+    """(n,) place of each node in `order`."""
     offset: Index
     beyond: Index
+    """Positions, after the front's own, that each front is coupled to, in compressed form;
+    ascending within a front."""
 
     @classmethod
     def of_order(

@@ -24,26 +24,19 @@ work."""
 
 @dataclass(frozen=True)
 class Part:
-    """Some fronts with the rows that they eliminate, and those beyond that they are coupled to.
-
-    Attributes
-    ----------
-    fronts
-        Their numbers, ascending.
-    positions, beyond
-        Positions in the elimination order of the part's own rows and of the rows beyond, ascending.
-    first
-        (fronts + 1,) first own row of each front, one a node.
-    near, near_offset
-        Rows that each front is coupled to, in compressed form: own rows, then rows beyond.
-    """
+    """Some fronts with the rows that they eliminate, and those beyond that they are coupled to."""
 
     fronts: Index
+    """Their numbers, ascending."""
     positions: Index
     beyond: Index
+    """Positions in the elimination order of the part's own rows and of the rows beyond,
+    ascending."""
     first: Index
+    """(fronts + 1,) first own row of each front, one a node."""
     near: Index
     near_offset: Index
+    """Rows that each front is coupled to, in compressed form: own rows, then rows beyond."""
 
     def rows_of(self, positions: Index) -> Index:
         """Rows of positions that the part has: own rows, then rows beyond."""
@@ -76,24 +69,16 @@ class Part:
 
 @dataclass(frozen=True)
 class Shares:
-    """All fronts in parts that threads work on: branches of the tree, and single fronts above them.
-
-    Attributes
-    ----------
-    parts
-        Children before parents.
-    parent
-        Number of each part's parent, -1 for a root.
-    children
-        Numbers of each part's children.
-    inherited
-        Rows of each part's `beyond` in its parent: own rows, then rows beyond.
-    """
+    """All fronts in parts that threads work on: branches of the tree, and single fronts above."""
 
     parts: list[Part]
+    """Children before parents."""
     parent: list[int]
+    """Number of each part's parent, -1 for a root."""
     children: list[list[int]]
+    """Numbers of each part's children."""
     inherited: list[Index]
+    """Rows of each part's `beyond` in its parent: own rows, then rows beyond."""
 
     @classmethod
     def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]]) -> Shares:

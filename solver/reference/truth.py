@@ -29,28 +29,19 @@ ABOVE_ALL = 1e-6
 
 @dataclass(frozen=True)
 class Truth:
-    """Eigenpairs from a general solver.
-
-    Attributes
-    ----------
-    values, vectors
-        (k,) ascending and (local, k), rigid modes included, k = `modes` and a few to spare.
-    modes
-        Number of modes asked for.
-    iterations
-        Outer iterations of the eigensolver.
-    searches
-        Searches in the complement of what was found before that went on where modes were missing.
-    added
-        Modes that these found.
-    """
+    """Eigenpairs from a general solver."""
 
     values: Array
     vectors: Array
+    """(k,) ascending and (local, k), rigid modes included, k = `modes` and a few to spare."""
     modes: int
+    """Number of modes asked for."""
     iterations: int
+    """Outer iterations of the eigensolver."""
     searches: int = 0
+    """Searches in the complement of what was found before that went on where modes were missing."""
     added: int = 0
+    """Modes that these found."""
 
     def lowest(self) -> tuple[Array, Array]:
         """The eigenpairs asked for, vectors row-major."""

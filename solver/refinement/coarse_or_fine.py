@@ -35,25 +35,17 @@ UNTOLD = "how far frequencies are off cannot be told"
 
 @dataclass
 class CoarseOrFine:
-    """A solid's modes.
-
-    Attributes
-    ----------
-    model
-        The model that was solved last, on rank 0.
-    steps
-        Coarse models that were rated; none if the fine solid was taken at once.
-    reason
-        Why the fine solid was taken, as a clause; None for a coarse model.
-    errors
-        Expected errors of the frequencies; None if they could not be estimated.
-    """
+    """A solid's modes."""
 
     model: ElasticModel | None
+    """The model that was solved last, on rank 0."""
     modes: Modes
     steps: list[RefinementStep]
+    """Coarse models that were rated; none if the fine solid was taken at once."""
     reason: str | None
+    """Why the fine solid was taken, as a clause; None for a coarse model."""
     errors: ExpectedErrors | None
+    """Expected errors of the frequencies; None if they could not be estimated."""
 
 
 def solve_coarsened(

@@ -46,21 +46,14 @@ may lie on either side: if the value is the shift, and if the shift is below all
 
 @dataclass(frozen=True)
 class NearModes:
-    """Approximate modes of the fine solid.
-
-    Attributes
-    ----------
-    values
-        (k,) Ritz values [rad^2/s^2], not below the eigenvalues.
-    vectors
-        (local, k) mass-orthonormal, this rank's rows.
-    missed
-        Number of modes below the shift that are not among them.
-    """
+    """Approximate modes of the fine solid."""
 
     values: Array
+    """(k,) Ritz values [rad^2/s^2], not below the eigenvalues."""
     vectors: Array
+    """(local, k) mass-orthonormal, this rank's rows."""
     missed: int
+    """Number of modes below the shift that are not among them."""
 
 
 class InverseIteration:
@@ -155,20 +148,14 @@ def _amid(values: Array) -> float:
 
 @dataclass
 class FineStart:
-    """Coarse modes, and the fine solid that they were rated by.
-
-    Attributes
-    ----------
-    values
-        (q,) elastic eigenvalues [rad^2/s^2] of the coarse model.
-    blocks, modes
-        The coarse mesh, and its modes (coarse n_dofs, q), on rank 0.
-    """
+    """Coarse modes, and the fine solid that they were rated by."""
 
     solid: InverseIteration
     values: Array
+    """(q,) elastic eigenvalues [rad^2/s^2] of the coarse model."""
     blocks: Blocks | None
     modes: Array | None
+    """The coarse mesh, and its modes (coarse n_dofs, q), on rank 0."""
 
     @property
     def prepared(self) -> Prepared:

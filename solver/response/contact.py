@@ -21,18 +21,12 @@ FAR = 0.5
 
 @dataclass(frozen=True)
 class Contact:
-    """A point of the surface.
-
-    Attributes
-    ----------
-    position : (3,) [m]
-        Where it is.
-    inward : (3,)
-        Unit vector into the solid.
-    """
+    """A point of the surface."""
 
     position: Array
+    """(3,) [m]: where it is."""
     inward: Array
+    """(3,) unit vector into the solid."""
 
 
 def choose_contacts(

@@ -46,21 +46,14 @@ class Damping:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Elastic modes seen at a few points of the surface; all that a response depends on.
-
-    Attributes
-    ----------
-    eigenvalues : (k,) [rad^2/s^2]
-        Rigid modes left out.
-    motion : (p, 3, k) [kg^-1/2]
-        Displacement of the points in each mode.
-    push : (p, k) [kg^-1/2]
-        Force on each mode by a unit force along the points' inward normals.
-    """
+    """Elastic modes seen at a few points of the surface; all that a response depends on."""
 
     eigenvalues: Array
+    """(k,) [rad^2/s^2]: rigid modes left out."""
     motion: Array
+    """(p, 3, k) [kg^-1/2]: displacement of the points in each mode."""
     push: Array
+    """(p, k) [kg^-1/2]: force on each mode by a unit force along the points' inward normals."""
 
     def lowest(self, count: int) -> Contacts:
         """The same without all modes beyond the first `count`."""

@@ -74,55 +74,38 @@ class StrikeOptions:
 
 @dataclass(frozen=True)
 class Response:
-    """What one spectrum makes of a strike.
-
-    Attributes
-    ----------
-    displacement : (t, 3) [m]
-        Displacement of the observed point after an impulse of 1 N s at the struck one.
-    sound : (s,)
-        Sound pressure at `SAMPLE_RATE_HERTZ`: strikes at all points in turn, each relative to the
-        loudest that the truth has, see `solver.response.response.contact_sounds`.
-    audible
-        Number of modes that sound.
-    difference
-        Relative 2-norm of the displacement's difference from the truth's.
-    distance_decibels
-        Rms difference of the spectrograms; NaN where the truth is not heard.
-    """
+    """What one spectrum makes of a strike."""
 
     displacement: Array
+    """(t, 3) [m]: displacement of the observed point after an impulse of 1 N s at the struck
+    one."""
     sound: Array
+    """(s,) sound pressure at `SAMPLE_RATE_HERTZ`: strikes at all points in turn, each relative to
+    the loudest that the truth has, see `solver.response.response.contact_sounds`."""
     audible: int
+    """Number of modes that sound."""
     difference: float
+    """Relative 2-norm of the displacement's difference from the truth's."""
     distance_decibels: float
+    """Rms difference of the spectrograms; NaN where the truth is not heard."""
 
 
 @dataclass(frozen=True)
 class ResponseFile:
-    """Contents of the file.
-
-    Attributes
-    ----------
-    seconds : (t,)
-        Instants of the displacements.
-    contacts
-        The points, by the names `POINTS`.
-    seen
-        The truth's modes at these points, as far as motions are made of them: without the last
-        cluster, which the end of the spectrum may cut.
-    responses
-        By name of the spectrum, the first being the truth.
-    attributes, provenance
-        Damping and so on; origin of the numbers.
-    """
+    """Contents of the file."""
 
     seconds: Array
+    """(t,) instants of the displacements."""
     contacts: dict[str, Contact]
+    """The points, by the names `POINTS`."""
     seen: Contacts
+    """The truth's modes at these points, as far as motions are made of them: without the last
+    cluster, which the end of the spectrum may cut."""
     responses: dict[str, Response]
+    """By name of the spectrum, the first being the truth."""
     attributes: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
+    """Damping and so on; origin of the numbers."""
 
 
 def respond(

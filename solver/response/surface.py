@@ -35,24 +35,16 @@ VANISHING = 1e-6
 
 @dataclass(frozen=True)
 class Surface:
-    """Points all over a surface.
-
-    Attributes
-    ----------
-    points : (s, 3)
-        Where they are [m].
-    outward : (s, 3)
-        Unit normals.
-    edge
-        Cell edge, or spacing [m].
-    nodes : (s,)
-        Nodes that the points are; None if they lie between nodes.
-    """
+    """Points all over a surface."""
 
     points: Array
+    """(s, 3) where they are [m]."""
     outward: Array
+    """(s, 3) unit normals."""
     edge: float
+    """Cell edge, or spacing [m]."""
     nodes: Index | None
+    """(s,) nodes that the points are; None if they lie between nodes."""
 
     def nearest(self, point: Array, what: str, reach: float | None = None) -> int:
         """Number of the point nearest to `point` (3,) [m].

@@ -36,46 +36,34 @@ EQUAL = 1e-9
 
 @dataclass
 class SpectrumComparison:
-    """Errors of a candidate against the truth; rigid modes are left out.
-
-    Attributes
-    ----------
-    eigenvalue_relative_error
-        Median, 90th percentile and maximum of `|lambda - truth| / truth`.
-    frequency_rms_relative_error
-        Root mean square over all compared modes.
-    frequency_rms_relative_error_7_60, frequency_max_relative_error_7_60
-        The same and the maximum over modes 7..60, or as many as there are.
-    subspace_angle_max
-        Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes
-        of the candidate, on the truth's mesh; the last cluster, which the end of the spectrum may
-        cut, is left out.  NaN if there is no other.
-    residual_max
-        Largest residual ratio of the candidate, recomputed from the K and M in its file.
-    modes_compared
-        Number of elastic modes compared.
-    clusters
-        First and last mode number of every cluster of the truth but the last, and its angle [rad].
-    matched
-        Frequency errors of the modes that are the same by their shapes, whatever their numbers, see
-        `matching.recognised`, and how many of these have `moved` to another number;
-        None on the truth's own mesh, where numbers tell.
-    material
-        In what the material differs, see `material_difference`; None where it is the same.
-    """
+    """Errors of a candidate against the truth; rigid modes are left out."""
 
     candidate: str
     truth: str
     eigenvalue_relative_error: dict[str, float]
+    """Median, 90th percentile and maximum of `|lambda - truth| / truth`."""
     frequency_rms_relative_error: float
+    """Root mean square over all compared modes."""
     frequency_rms_relative_error_7_60: float
     frequency_max_relative_error_7_60: float
+    """The same and the maximum over modes 7..60, or as many as there are."""
     subspace_angle_max: float
+    """Largest M-weighted principal angle [rad] between a cluster of the truth and the same modes of
+    the candidate, on the truth's mesh; the last cluster, which the end of the spectrum may cut, is
+    left out.  NaN if there is no other."""
     residual_max: float
+    """Largest residual ratio of the candidate, recomputed from the K and M in its file."""
     modes_compared: int
+    """Number of elastic modes compared."""
     clusters: list[dict[str, Any]]
+    """First and last mode number of every cluster of the truth but the last, and its angle
+    [rad]."""
     matched: dict[str, Any] | None = None
+    """Frequency errors of the modes that are the same by their shapes, whatever their numbers, see
+    `matching.recognised`, and how many of these have `moved` to another number; None on the truth's
+    own mesh, where numbers tell."""
     material: dict[str, Any] | None = None
+    """In what the material differs, see `material_difference`; None where it is the same."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON, without what there is not."""

@@ -38,50 +38,37 @@ NEGLIGIBLE, FEWEST_SOLVED = 1e-8, 8
 
 @dataclass(frozen=True)
 class ModesEvidence:
-    """How far the modes of a file are from eigenpairs, and whether any are missing.
-
-    Attributes
-    ----------
-    modes, unknowns
-        Number of modes and of unknowns.
-    residual_max, residual_median
-        Largest and median of the residual ratios, see
-        `solver.verification.residuals.residual_ratios`.
-    energy_residuals
-        (k,) residuals r = K x - lambda M x in energy: the root of r^T (K + s M)^-1 r / lambda,
-        where s is the last eigenvalue; lambda of rigid modes is the first elastic one.  Its square
-        is of the order of the eigenvalue's relative error.  Where the residual ratio is below
-        `NEGLIGIBLE`, that ratio.
-    rounding
-        (k,) by how much each eigenvalue changes, relatively, if every product with an entry of K is
-        rounded once: the unit roundoff times `|x|^T |K| |x| / lambda`.
-    quotient_errors
-        (k,) relative difference of each eigenvalue from the Rayleigh quotient of its mode; 0 of
-        rigid ones.
-    orthogonality
-        Largest entry of `|X^T M X - I|`.
-    rigid_modes
-        Number of eigenvalues that are zero to rounding.
-    counted_below, counted, expected
-        A value [rad^2/s^2], the number of eigenvalues below it by the inertia of K - value M, and
-        the number that the file holds; None where PETSc cannot count.
-    mass
-        Mass of the solid [kg].
-    """
+    """How far the modes of a file are from eigenpairs, and whether any are missing."""
 
     modes: int
     unknowns: int
+    """Number of modes and of unknowns."""
     residual_max: float
     residual_median: float
+    """Largest and median of the residual ratios, see
+    `solver.verification.residuals.residual_ratios`."""
     energy_residuals: list[float]
+    """(k,) residuals r = K x - lambda M x in energy: the root of r^T (K + s M)^-1 r / lambda, where
+    s is the last eigenvalue; lambda of rigid modes is the first elastic one.  Its square is of the
+    order of the eigenvalue's relative error.  Where the residual ratio is below `NEGLIGIBLE`, that
+    ratio."""
     rounding: list[float]
+    """(k,) by how much each eigenvalue changes, relatively, if every product with an entry of K is
+    rounded once: the unit roundoff times `|x|^T |K| |x| / lambda`."""
     quotient_errors: list[float]
+    """(k,) relative difference of each eigenvalue from the Rayleigh quotient of its mode; 0 of
+    rigid ones."""
     orthogonality: float
+    """Largest entry of `|X^T M X - I|`."""
     rigid_modes: int
+    """Number of eigenvalues that are zero to rounding."""
     counted_below: float
     counted: int | None
     expected: int
+    """A value [rad^2/s^2], the number of eigenvalues below it by the inertia of K - value M, and
+    the number that the file holds; None where PETSc cannot count."""
     mass: float
+    """Mass of the solid [kg]."""
 
 
 def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:

@@ -23,21 +23,14 @@ AUDIBLE_FIRST, AUDIBLE_LAST = 7, 60
 
 @dataclass(frozen=True)
 class Matching:
-    """The mode of another solution that each mode of the truth is, no two the same.
-
-    Attributes
-    ----------
-    partners : (k,)
-        Indices among the other solution's modes.
-    overlaps : (k,)
-        With the partner: 1 for the same shape, 0 for an orthogonal one.
-    largest : (k,)
-        With any mode of the other solution.
-    """
+    """The mode of another solution that each mode of the truth is, no two the same."""
 
     partners: Index
+    """(k,) indices among the other solution's modes."""
     overlaps: Array
+    """(k,) with the partner: 1 for the same shape, 0 for an orthogonal one."""
     largest: Array
+    """(k,) with any mode of the other solution."""
 
 
 def mode_overlaps(modes: Array, others: Array, weighted: Array) -> Array:
@@ -158,22 +151,16 @@ def subspace_angles(modes: Array, truth: Array, M: sp.csr_matrix, groups: list[s
 
 @dataclass(frozen=True)
 class FrequencyErrors:
-    """Relative errors of the frequencies of modes `first`..`last`, matched by index.
-
-    Attributes
-    ----------
-    rms, mean
-        Root mean square and signed mean.
-    worst, worst_mode
-        The error of largest magnitude, with its sign, and the mode that has it.
-    """
+    """Relative errors of the frequencies of modes `first`..`last`, matched by index."""
 
     first: int
     last: int
     rms: float
     mean: float
+    """Root mean square and signed mean."""
     worst: float
     worst_mode: int
+    """The error of largest magnitude, with its sign, and the mode that has it."""
 
 
 def frequency_errors(errors: Array, last: int) -> FrequencyErrors:

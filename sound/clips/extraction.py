@@ -40,33 +40,23 @@ class ModalSound:
     """A contact sound as damped sinusoids and a rest.
 
     s(t) = sum_k a_k exp(-d_k t) sin(2 pi f_k t + theta_k) + residual, t = 0 at the strike.
-
-    Attributes
-    ----------
-    frequencies : (n,) [Hz]
-        Ascending.
-    dampings : (n,) [1/s]
-        d.
-    amplitudes : (n,)
-        Amplitudes at the strike, in units of the samples.
-    phases : (n,) [rad]
-        theta.
-    residual : (s,)
-        The clip from the beginning of free vibration to a second strike or a fade-out, minus all
-        modes, including those that are not kept.
-    rate : int [Hz]
-        Samples per second.
-    evidence : dict
-        Details of the search and of its accuracy; plain values.
     """
 
     frequencies: Array
+    """(n,) [Hz]: ascending."""
     dampings: Array
+    """(n,) [1/s]: d."""
     amplitudes: Array
+    """(n,) amplitudes at the strike, in units of the samples."""
     phases: Array
+    """(n,) [rad]: theta."""
     residual: Array
+    """(s,) the clip from the beginning of free vibration to a second strike or a fade-out, minus
+    all modes, including those that are not kept."""
     rate: int
+    """int [Hz]: samples per second."""
     evidence: dict[str, Any]
+    """dict: details of the search and of its accuracy; plain values."""
 
     @property
     def energies(self) -> Array:

@@ -57,24 +57,21 @@ class Task:
 
     Attributes
     ----------
-    z, start : (m,), (3 n, k) or None
-        Coordinates, and rows of modes that the analysis starts from.
     gradient, fine
         Whether the gradient of the cost is computed, and whether the fine solid is analysed.
-    options, steps, damping, limits
-        Parameters of a descent, see `descend`; without options the task is a single evaluation.
-    objective
-        Objective instead of the setting's.
     """
 
     z: Array
     start: Array | None = None
+    """(m,), (3 n, k) or None: coordinates, and rows of modes that the analysis starts from."""
     gradient: bool = False
     options: StepOptions | LimitedMemory | TrustRegion | None = None
     steps: int = 0
     damping: tuple[float, ...] | None = None
     limits: DescentLimits = DescentLimits()
+    """Parameters of a descent, see `descend`; without options the task is a single evaluation."""
     objective: Objective | None = None
+    """Objective instead of the setting's."""
     fine: bool = False
 
 
@@ -86,23 +83,20 @@ class Trial:
     ----------
     z, gradient : (m,), (m,) or None
         Coordinates of the material, and the gradient of the cost if it was computed.
-    cost, evaluations
-        Cost, `FAILED` if the modes were not found, and number of evaluations.
-    descent
-        Record of a descent, without its modes.
-    start : (3 n, k) or None
-        Rows of modes for other analyses to start from, of a descent or with the gradient.
-    eigenvalues : (N,) [rad^2/s^2] or None
-        Eigenvalues of the elastic modes, if they were found.
     """
 
     z: Array
     cost: DesignCost
     evaluations: int
+    """Cost, `FAILED` if the modes were not found, and number of evaluations."""
     gradient: Array | None = None
     descent: DesignDescent | None = None
+    """Record of a descent, without its modes."""
     start: Array | None = None
+    """(3 n, k) or None: rows of modes for other analyses to start from, of a descent or with the
+    gradient."""
     eigenvalues: Array | None = None
+    """(N,) [rad^2/s^2] or None: eigenvalues of the elastic modes, if they were found."""
 
 
 @dataclass(frozen=True)

@@ -55,54 +55,41 @@ class MaterialDamping:
 
 @dataclass
 class Design:
-    """A material whose struck points sound as their clips.
-
-    Attributes
-    ----------
-    strikes, targets
-        T struck points, and the modes that they shall have.
-    coordinates : (m,)
-        z of the reduced material Y = Phi z (§6), over a reference modulus.
-    young : (M,) [Pa]
-        Young's modulus of the fine cells, scaled so that the frequencies come nearest to the
-        targets (least squares of cents).
-    model
-        Analysed solid with its moduli.
-    eigenvalues, modes : (6 + N,) [rad^2/s^2], (n_dofs, 6 + N) [kg^-1/2]
-        Eigenvalues, ascending, those of the rigid motions first; mass-normalised modes.
-    surface_vertices, surface_faces : (V, 3) [m], (F, 3)
-        Vertices and triangles of the surface.
-    fine_grid, fine_origin, fine_edge : (M, 3), (3,) [m], float [m]
-        Integer coordinates of the fine cells, position of coordinates 0, edge of a cell.
-    history
-        Rows of `HISTORY_TYPE`, see `HISTORY`.
-    settings, evidence, provenance : dict
-        The project with all defaults; method and quality of the result; origin of the numbers,
-        set on reading.
-    fine
-        Frequencies of the fine solid; None if they were not computed.
-    damping
-        Loss factors of the material, and dampings by them; None in old designs.
-    """
+    """A material whose struck points sound as their clips."""
 
     strikes: list[Strike]
     targets: Targets
+    """T struck points, and the modes that they shall have."""
     coordinates: Array
+    """(m,) z of the reduced material Y = Phi z (§6), over a reference modulus."""
     young: Array
+    """(M,) [Pa]: young's modulus of the fine cells, scaled so that the frequencies come nearest to
+    the targets (least squares of cents)."""
     model: Solid
+    """Analysed solid with its moduli."""
     eigenvalues: Array
     modes: Array
+    """(6 + N,) [rad^2/s^2], (n_dofs, 6 + N) [kg^-1/2]: eigenvalues, ascending, those of the rigid
+    motions first; mass-normalised modes."""
     surface_vertices: Array
     surface_faces: Integers
+    """(V, 3) [m], (F, 3): vertices and triangles of the surface."""
     fine_grid: Integers
     fine_origin: Array
     fine_edge: float
+    """(M, 3), (3,) [m], float [m]: integer coordinates of the fine cells, position of coordinates
+    0, edge of a cell."""
     history: NDArray[np.void]
+    """Rows of `HISTORY_TYPE`, see `HISTORY`."""
     settings: dict[str, Any]
     evidence: dict[str, Any]
     provenance: dict[str, Any] = field(default_factory=dict)
+    """dict: the project with all defaults; method and quality of the result; origin of the numbers,
+    set on reading."""
     fine: FineFrequencies | None = None
+    """Frequencies of the fine solid; None if they were not computed."""
     damping: MaterialDamping | None = None
+    """Loss factors of the material, and dampings by them; None in old designs."""
 
     @property
     def unit(self) -> float:

@@ -103,36 +103,33 @@ class Body:
     ----------
     entry, shape
         The object's entry in the scene, and its surface.
-    mass, inertia : float [kg], (3, 3) [kg m^2]
-        Mass, and inertia about the centre of mass in the body's own axes.
-    centre : (3,) [m]
-        Centre of mass, in the coordinates of the solid.
-    compliance : (V,) [1/Pa]
-        Compliance of the material at the surface's vertices, see `sound.scenes.hertz.compliance`.
-    parts : list of (n, 3) [m]
-        Corners of the convex parts that collide, in the body's own axes; none for a ball.
-    solid, listening
-        Modes, None if the body is silent; loudness and noise of a design's clips, None without.
-    radius : float [m] or None
-        Radius of a ball, None for any other body.
-    turn : (3, 3) or None
-        Rotation from the coordinates of the solid to the body's own axes; None if they agree.
-    accuracy : dict or None
-        Expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`, if known.
     """
 
     entry: ObjectEntry
     mass: float
     inertia: Array
+    """float [kg], (3, 3) [kg m^2]: mass, and inertia about the centre of mass in the body's own
+    axes."""
     centre: Array
+    """(3,) [m]: centre of mass, in the coordinates of the solid."""
     shape: Shape
     compliance: Array
+    """(V,) [1/Pa]: compliance of the material at the surface's vertices, see
+    `sound.scenes.hertz.compliance`."""
     parts: list[Array]
+    """list of (n, 3) [m]: corners of the convex parts that collide, in the body's own axes; none
+    for a ball."""
     solid: SoundingSolid | None
     listening: Listening | None
+    """Modes, None if the body is silent; loudness and noise of a design's clips, None without."""
     radius: float | None
+    """float [m] or None: radius of a ball, None for any other body."""
     turn: Array | None
+    """(3, 3) or None: rotation from the coordinates of the solid to the body's own axes; None if
+    they agree."""
     accuracy: dict[str, Any] | None
+    """dict or None: expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`, if
+    known."""
 
     @property
     def volume(self) -> float:

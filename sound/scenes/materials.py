@@ -21,16 +21,6 @@ class NamedMaterial:
     ----------
     about, source
         Description, with what is simplified; source of the numbers.
-    young, poisson, density : float [Pa], [1], [kg/m^3]
-        Young's modulus, Poisson's ratio, mass density.
-    alpha, beta : float [1/s], [s]
-        Rayleigh damping: the damping matrix is alpha M + beta K.
-    restitution : float [1]
-        Speed after over speed before an impact at about 1 m/s on a hard, heavy body.
-    friction, roughness : float [1], [m]
-        Coulomb's coefficient of sliding friction; root mean square height of the surface.
-    colour : (3,)
-        Red, green and blue from 0 to 1 (sRGB).
     """
 
     name: str
@@ -38,12 +28,18 @@ class NamedMaterial:
     young: float
     poisson: float
     density: float
+    """float [Pa], [1], [kg/m^3]: young's modulus, Poisson's ratio, mass density."""
     alpha: float
     beta: float
+    """float [1/s], [s]: rayleigh damping: the damping matrix is alpha M + beta K."""
     restitution: float
+    """float [1]: speed after over speed before an impact at about 1 m/s on a hard, heavy body."""
     friction: float
     roughness: float
+    """float [1], [m]: coulomb's coefficient of sliding friction; root mean square height of the
+    surface."""
     colour: tuple[float, float, float]
+    """(3,) red, green and blue from 0 to 1 (sRGB)."""
     source: str
 
     @property

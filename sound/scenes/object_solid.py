@@ -33,30 +33,26 @@ class ObjectSolid:
 
     Attributes
     ----------
-    rigid
-        Mass, centre of mass and inertia.
-    vertices, faces, young, poisson : (V, 3) [m], (F, 3), (V,) [Pa], float
-        Surface, Young's modulus at its vertices, and Poisson's ratio.
     sounding, listening
         Modes, None if the object is silent; loudness and noise of a design's clips, None without.
-    mesh : str
-        Name of the mesh file that the solid was made from, empty if there is none.
-    radius : float [m] or None
-        Radius of a ball, None for any other solid.
-    accuracy : dict or None
-        Expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`.
     """
 
     rigid: MassProperties
+    """Mass, centre of mass and inertia."""
     vertices: Array
     faces: NDArray[np.integer]
     young: Array
     poisson: float
+    """(V, 3) [m], (F, 3), (V,) [Pa], float: surface, Young's modulus at its vertices, and Poisson's
+    ratio."""
     sounding: SoundingSolid | None
     mesh: str = ""
+    """str: name of the mesh file that the solid was made from, empty if there is none."""
     listening: Listening | None = None
     radius: float | None = None
+    """float [m] or None: radius of a ball, None for any other solid."""
     accuracy: dict[str, Any] | None = None
+    """dict or None: expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`."""
 
 
 def object_solid(entry: ObjectEntry) -> ObjectSolid:

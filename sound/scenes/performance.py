@@ -126,37 +126,29 @@ class Voice:
 
 @dataclass(frozen=True)
 class Performance:
-    """A scene that was played.
-
-    Attributes
-    ----------
-    title, picture
-        Title of the scene; surfaces, motion and camera.
-    sound, rate : (s, 2) [full scale], int [Hz]
-        Sound at the left and the right ear, and samples per second.
-    impacts
-        Impacts in the order of time, without rolling and sliding.
-    voices, scale : B voices, float [1/Pa]
-        Sounds of the objects, None for a silent one; full scale per pascal.
-    timings : dict [s]
-        Wall time of each step of the work.
-    accuracies : B dicts
-        Expected errors of each object's frequencies, see `sound.scenes.uniform.UniformSolid`; None
-        for a silent object, or if they are unknown.
-    moved : dict
-        Displacements (3,) [m] of overlapping objects that were separated at the start, by name.
-    """
+    """A scene that was played."""
 
     title: str
     picture: Picture
+    """Title of the scene; surfaces, motion and camera."""
     sound: Array
     rate: int
+    """(s, 2) [full scale], int [Hz]: sound at the left and the right ear, and samples per
+    second."""
     impacts: list[Impact]
+    """Impacts in the order of time, without rolling and sliding."""
     voices: list[Voice | None]
     scale: float = 1.0
+    """B voices, float [1/Pa]: sounds of the objects, None for a silent one; full scale per
+    pascal."""
     timings: dict[str, float] = field(default_factory=dict)
+    """dict [s]: wall time of each step of the work."""
     accuracies: list[dict[str, Any] | None] = field(default_factory=list)
+    """B dicts: expected errors of each object's frequencies, see
+    `sound.scenes.uniform.UniformSolid`; None for a silent object, or if they are unknown."""
     moved: dict[str, list[float]] = field(default_factory=dict)
+    """dict: displacements (3,) [m] of overlapping objects that were separated at the start, by
+    name."""
 
 
 def linear_light(colour: Sequence[float]) -> Array:

@@ -25,32 +25,26 @@ SILENT = 1e-30
 
 @dataclass(frozen=True)
 class Excitation:
-    """Strikes, lasting forces and added damping of the K modes of a body.
-
-    Attributes
-    ----------
-    firsts, since : (S,)
-        Numbers of the first samples of S strikes, ascending, and time from the beginning of each
-        strike to that, in samples from 0 to 1.
-    durations, amplitudes : (S,) [s], (S, K)
-        Durations of the strikes' forces, half a sine each, and amplitudes of the modes after them.
-    blocks, courses : (P,), (P, BLOCK)
-        Numbers of the blocks in which P lasting forces act, ascending; each force by samples.
-    pushes : (P, K) [1/s]
-        Amplitudes of the modes after a second of each lasting force at magnitude 1.
-    damped, dampings : (D,), (D, K) [1/s]
-        Numbers of the blocks with added damping, ascending, and that of the modes.
-    """
+    """Strikes, lasting forces and added damping of the K modes of a body."""
 
     firsts: Index
     since: Array
+    """(S,) numbers of the first samples of S strikes, ascending, and time from the beginning of
+    each strike to that, in samples from 0 to 1."""
     durations: Array
     amplitudes: Array
+    """(S,) [s], (S, K): durations of the strikes' forces, half a sine each, and amplitudes of the
+    modes after them."""
     blocks: Index
     courses: Array
+    """(P,), (P, BLOCK): numbers of the blocks in which P lasting forces act, ascending; each force
+    by samples."""
     pushes: Array
+    """(P, K) [1/s]: amplitudes of the modes after a second of each lasting force at magnitude 1."""
     damped: Index
     dampings: Array
+    """(D,), (D, K) [1/s]: numbers of the blocks with added damping, ascending, and that of the
+    modes."""
 
 
 def ring(

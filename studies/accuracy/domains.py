@@ -16,19 +16,13 @@ Degrees = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Domain:
-    """Quadrature over a solid about the origin that is symmetric in the three planes.
-
-    Attributes
-    ----------
-    points, weights
-        (q, 3) [m] and (q,) [m^3]; no point lies in one of the planes.
-    sides
-        Of its bounding box [m].
-    """
+    """Quadrature over a solid about the origin that is symmetric in the three planes."""
 
     points: Array
     weights: Array
+    """(q, 3) [m] and (q,) [m^3]; no point lies in one of the planes."""
     sides: Sides
+    """Of its bounding box [m]."""
 
     def octant(self) -> Domain:
         """The same of functions that are even in each coordinate, from an eighth of the points."""

@@ -32,27 +32,18 @@ DOMAINS: dict[str, Callable[[Sides, Degrees], Domain]] = {
 
 @dataclass(frozen=True)
 class ReferenceSolid:
-    """A solid with a closed form.
-
-    Attributes
-    ----------
-    title
-        Name for people.
-    shape
-        A key of `DOMAINS`.
-    sides
-        Of its bounding box, before it is turned [m].
-    degrees
-        Of the polynomials, see `free_eigenvalues`.
-    spacings
-        Between the nodes of its models [m], coarsest first.
-    """
+    """A solid with a closed form."""
 
     title: str
+    """Name for people."""
     shape: str
+    """A key of `DOMAINS`."""
     sides: Sides
+    """Of its bounding box, before it is turned [m]."""
     degrees: Degrees
+    """Of the polynomials, see `free_eigenvalues`."""
     spacings: tuple[float, ...]
+    """Between the nodes of its models [m], coarsest first."""
 
     def frequencies(self, count: int, fewer: int = 0) -> Array:
         """The lowest elastic frequencies [Hz], by degrees that are lower by `fewer`."""

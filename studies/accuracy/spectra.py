@@ -21,26 +21,18 @@ from studies.accuracy.solids import DENSITY, POISSON, YOUNG
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Eigenvalues (k,) [rad^2/s^2], rigid motions first, and what they took.
-
-    Attributes
-    ----------
-    spacing
-        Between neighbouring nodes [m]; of tetrahedra as it was asked for.
-    unknowns
-        Of the model.
-    build_seconds, solve_seconds
-        Wall time from the surface to the mesh, and from there to the eigenvalues.
-    expected
-        Root mean square error that finite cells expect of themselves.
-    """
+    """Eigenvalues (k,) [rad^2/s^2], rigid motions first, and what they took."""
 
     values: Array
     spacing: float
+    """Between neighbouring nodes [m]; of tetrahedra as it was asked for."""
     unknowns: int
+    """Of the model."""
     build_seconds: float
     solve_seconds: float
+    """Wall time from the surface to the mesh, and from there to the eigenvalues."""
     expected: float | None = None
+    """Root mean square error that finite cells expect of themselves."""
 
 
 def cells(surface: Surface, name: str, spacing: float, kind: str, modes: int) -> Spectrum:

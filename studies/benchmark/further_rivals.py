@@ -28,30 +28,20 @@ class UnavailableError(ConvergenceError):
 
 @dataclass(frozen=True)
 class FurtherRival:
-    """A general eigensolver.
-
-    Attributes
-    ----------
-    meaning
-        What it is, for the row.
-    search
-        Finds the elastic pairs asked for, or raises ConvergenceError.
-    packages
-        Optional Python packages that it needs.
-    eps_type
-        SLEPc's eigensolver that it is, which may not be built in.
-    interval
-        Whether it finds what is in an interval, and no number of pairs.
-    lumped
-        Whether it needs a diagonal mass.
-    """
+    """A general eigensolver."""
 
     meaning: str
+    """What it is, for the row."""
     search: Callable[[RivalSearch], Pairs]
+    """Finds the elastic pairs asked for, or raises ConvergenceError."""
     packages: tuple[str, ...] = ()
+    """Optional Python packages that it needs."""
     eps_type: str | None = None
+    """SLEPc's eigensolver that it is, which may not be built in."""
     interval: bool = False
+    """Whether it finds what is in an interval, and no number of pairs."""
     lumped: bool = False
+    """Whether it needs a diagonal mass."""
 
     def require(self, ranks: int) -> None:
         """Raise UnavailableError unless it runs here."""

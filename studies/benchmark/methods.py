@@ -44,56 +44,37 @@ BELOW_ELASTIC, ABOVE_LAST = 0.5, 1.0 + 1e-4
 
 @dataclass(frozen=True)
 class MethodRun:
-    """One run of a method.
-
-    Attributes
-    ----------
-    seconds
-        Wall time from moduli to modes, without checks.
-    values
-        (k,) eigenvalues found.
-    before
-        Wall time [s] of what needs the mesh alone.
-    phases
-        Wall time [s] by phase, checks left out.
-    added
-        Modes that the method missed, and that were found when its result was checked.
-    """
+    """One run of a method."""
 
     seconds: float
+    """Wall time from moduli to modes, without checks."""
     values: Array
+    """(k,) eigenvalues found."""
     before: float = 0.0
+    """Wall time [s] of what needs the mesh alone."""
     phases: dict[str, float] = field(default_factory=dict)
+    """Wall time [s] by phase, checks left out."""
     added: int = 0
+    """Modes that the method missed, and that were found when its result was checked."""
 
 
 @dataclass
 class Methods:
-    """Every way to the lowest modes of one solid; all ranks call the same.
-
-    Attributes
-    ----------
-    solid
-        On rank 0, None elsewhere.
-    modes
-        Number of modes, rigid ones included.
-    configuration
-        Of SLEPc's Krylov-Schur, wherever it is used.
-    seed
-        Of the partition.
-    brief
-        Whether one correction will do, as it does to compile and load everything.
-    rival_seconds
-        Wall time [s] after which a further rival is given up.
-    """
+    """Every way to the lowest modes of one solid; all ranks call the same."""
 
     solid: BenchmarkSolid | None
+    """On rank 0, None elsewhere."""
     modes: int
+    """Number of modes, rigid ones included."""
     configuration: SlepcConfiguration
+    """Of SLEPc's Krylov-Schur, wherever it is used."""
     seed: int = 0
+    """Of the partition."""
     comm: MPI.Comm = field(default_factory=lambda: MPI.COMM_WORLD)
     brief: bool = False
+    """Whether one correction will do, as it does to compile and load everything."""
     rival_seconds: float = RIVAL_SECONDS
+    """Wall time [s] after which a further rival is given up."""
     _exact: Array | None = None
     _warm: tuple[ModalSolver, Modes] | None = None
 

@@ -33,18 +33,12 @@ MOST_RESTARTS = 2000
 
 @dataclass(frozen=True)
 class SlepcConfiguration:
-    """How SLEPc's shift-and-invert Krylov-Schur is set up.
-
-    Attributes
-    ----------
-    package
-        Sparse Cholesky factorisation, as PETSc calls it.
-    subspace
-        Lanczos vectors for each mode wanted.
-    """
+    """How SLEPc's shift-and-invert Krylov-Schur is set up."""
 
     package: str
+    """Sparse Cholesky factorisation, as PETSc calls it."""
     subspace: float
+    """Lanczos vectors for each mode wanted."""
 
     @classmethod
     def default(cls, ranks: int) -> SlepcConfiguration:

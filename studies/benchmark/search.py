@@ -28,32 +28,22 @@ class RivalSearch:
 
     The unknowns are scaled so that the mass has a unit diagonal: the norms by which general solvers
     stop mean the same for every unknown then.
-
-    Attributes
-    ----------
-    system
-        On one rank.
-    linear
-        Makes inverses on its mesh.
-    count
-        Elastic pairs wanted.
-    interval
-        An interval (low, high) [rad^2/s^2] that holds them and no rigid motions.
-    tolerance
-        Of |K x - lambda M x| / lambda in the 2-norm, where x has unit mass.
-    seed
-        Of what the search starts from.
-    seconds
-        Wall time from when this is made after which a rival is given up.
     """
 
     system: System
+    """On one rank."""
     linear: LinearSolver
+    """Makes inverses on its mesh."""
     count: int
+    """Elastic pairs wanted."""
     interval: tuple[float, float]
+    """An interval (low, high) [rad^2/s^2] that holds them and no rigid motions."""
     tolerance: float
+    """Of |K x - lambda M x| / lambda in the 2-norm, where x has unit mass."""
     seed: int
+    """Of what the search starts from."""
     seconds: float
+    """Wall time from when this is made after which a rival is given up."""
     begin: float = field(default_factory=time.perf_counter)
 
     @property

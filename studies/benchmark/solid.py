@@ -24,28 +24,19 @@ NOT_COARSENED = "without coarse models and lumped masses: they are of voxels, no
 
 @dataclass(frozen=True)
 class BenchmarkSolid:
-    """A meshed solid, held by rank 0 alone.
-
-    Attributes
-    ----------
-    problem
-        The fine mesh with its material.
-    blocks
-        The coarse mesh; None of finite cells, which are not coarsened.
-    changed
-        (m,) moduli [Pa] that differ from the material's by a smooth field of `CHANGE`.
-    forest, reason
-        The forests, or None and why there are none to coarsen with.
-    seconds
-        Wall time of what needs the mesh alone.
-    """
+    """A meshed solid, held by rank 0 alone."""
 
     problem: Problem
+    """The fine mesh with its material."""
     blocks: Blocks | None
+    """The coarse mesh; None of finite cells, which are not coarsened."""
     changed: Array
+    """(m,) moduli [Pa] that differ from the material's by a smooth field of `CHANGE`."""
     forest: ForestCoarsening | None
     reason: str
+    """The forests, or None and why there are none to coarsen with."""
     seconds: dict[str, float]
+    """Wall time of what needs the mesh alone."""
 
     @property
     def fine(self) -> Solid:

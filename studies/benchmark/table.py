@@ -18,42 +18,28 @@ from studies.benchmark.methods import (
 
 @dataclass(frozen=True)
 class TimedMethod:
-    """A row of the time table.
-
-    Attributes
-    ----------
-    run
-        Makes one run.
-    meaning
-        What it is, where its name does not say so.
-    reference
-        Spectrum of SLEPc that it approximates: `fine`, `coarse` or `coarse_changed`.
-    over
-        Methods that its speed-up is told over.
-    coarse
-        Whether it is on the coarse mesh.
-    needs
-        `forests` or `voxels`, without which it is left out.
-    option
-        Option that asks for it.
-    design
-        Whether it is run beside what a design does.
-    slow
-        Whether it takes part in the slow rounds alone.
-    problem
-        What it solves, where that is another problem than its name says.
-    """
+    """A row of the time table."""
 
     run: Callable[[Methods], MethodRun]
+    """Makes one run."""
     meaning: str = ""
+    """What it is, where its name does not say so."""
     reference: str | None = None
+    """Spectrum of SLEPc that it approximates: `fine`, `coarse` or `coarse_changed`."""
     over: tuple[str, ...] = ()
+    """Methods that its speed-up is told over."""
     coarse: bool = False
+    """Whether it is on the coarse mesh."""
     needs: str | None = None
+    """`forests` or `voxels`, without which it is left out."""
     option: str | None = None
+    """Option that asks for it."""
     design: bool = True
+    """Whether it is run beside what a design does."""
     slow: bool = False
+    """Whether it takes part in the slow rounds alone."""
     problem: str = ""
+    """What it solves, where that is another problem than its name says."""
 
 
 _LUMPED_MASS = (

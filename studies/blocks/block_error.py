@@ -54,63 +54,41 @@ AT_ONCE = 500
 
 @dataclass(frozen=True)
 class ErrorTables:
-    """What a void pattern decides; r = active degrees of freedom less motions without strain.
-
-    Attributes
-    ----------
-    stiffness : (8, r * r)
-        Flattened K_j of the cells on the complement of N, zero for void ones.
-    basis : (r, 18)
-        Orthonormal basis V of the coarse element's displacements Y = V R.
-    inertia, corners : (r, 18)
-        Inertial loads W and corner forces C^T Z.
-    loads
-        Matrices (18, 18) and (18, m) by load case: the coarse element answers
-        `left @ K_c^-1 @ right`.
-    """
+    """What a void pattern decides; r = active degrees of freedom less motions without strain."""
 
     stiffness: Array
+    """(8, r * r) flattened K_j of the cells on the complement of N, zero for void ones."""
     basis: Array
+    """(r, 18) orthonormal basis V of the coarse element's displacements Y = V R."""
     inertia: Array
     corners: Array
+    """(r, 18) inertial loads W and corner forces C^T Z."""
     loads: dict[str, tuple[Array, Array]]
+    """Matrices (18, 18) and (18, m) by load case: the coarse element answers `left @ K_c^-1 @
+    right`."""
 
 
 class FineResponse(NamedTuple):
-    """Fine answers of n blocks to one load case.
-
-    Attributes
-    ----------
-    target : (n, 18, m)
-        Part that a coarse element can answer.
-    rest : (n,)
-        Square of what it cannot.
-    total : (n,)
-        Square of both.
-    """
+    """Fine answers of n blocks to one load case."""
 
     target: Array
+    """(n, 18, m) part that a coarse element can answer."""
     rest: Array
+    """(n,) square of what it cannot."""
     total: Array
+    """(n,) square of both."""
 
 
 class Errors(NamedTuple):
-    """Mean squares of each block by load case, (n,) each.
-
-    Attributes
-    ----------
-    squared
-        E|u_c - u|^2.
-    minimum
-        What it cannot fall below, whatever the element: the part of u that no motion of the corners
-        gives; 0 for loads on the corners.
-    reference
-        E|u|^2.
-    """
+    """Mean squares of each block by load case, (n,) each."""
 
     squared: dict[str, Array]
+    """E|u_c - u|^2."""
     minimum: dict[str, Array]
+    """What it cannot fall below, whatever the element: the part of u that no motion of the corners
+    gives; 0 for loads on the corners."""
     reference: dict[str, Array]
+    """E|u|^2."""
 
     def relative(self, load: str) -> Array:
         """E|u_c - u|^2 / E|u|^2 of each block."""

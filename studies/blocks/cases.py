@@ -21,29 +21,20 @@ STREAMS = 16
 
 @dataclass(frozen=True)
 class BlockCase:
-    """A distribution of blocks.
-
-    Attributes
-    ----------
-    low, high
-        Range of the moduli of filled cells [GPa], before scaling.
-    distribution
-        "uniform" or "log-uniform", cells independent.
-    void
-        Whether every block has void cells, of a pattern drawn by class as in training data; else
-        none has.
-    stream
-        Number of the sequence of samples; cases of one stream have the same blocks.
-    scaled_by
-        Factor on all moduli.
-    """
+    """A distribution of blocks."""
 
     low: float
     high: float
+    """Range of the moduli of filled cells [GPa], before scaling."""
     distribution: str
+    """"uniform" or "log-uniform", cells independent."""
     void: bool
+    """Whether every block has void cells, of a pattern drawn by class as in training data; else
+    none has."""
     stream: int
+    """Number of the sequence of samples; cases of one stream have the same blocks."""
     scaled_by: float = 1.0
+    """Factor on all moduli."""
 
     @property
     def fill(self) -> str:

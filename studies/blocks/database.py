@@ -54,33 +54,22 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Database:
-    """Coarse metamaterials of base materials.
-
-    Attributes
-    ----------
-    materials : (m,)
-        Young's moduli in ascending order, any unit; the first may be 0, void.
-    keys : (k,)
-        Of combinations, see `studies.blocks.combinations`; ascending.
-    entries : (k,)
-        Representative of each combination.
-    moduli : (r, 8)
-        Coarse moduli of the representatives, in the unit of the materials.
-    poisson
-        Poisson's ratio of all materials.
-    radius
-        Largest distance of a metamaterial from its representative, |log E - log E'|.
-    seconds
-        Time that building it took on one core.
-    """
+    """Coarse metamaterials of base materials."""
 
     materials: Array
+    """(m,) young's moduli in ascending order, any unit; the first may be 0, void."""
     keys: NDArray[np.uint32]
+    """(k,) of combinations, see `studies.blocks.combinations`; ascending."""
     entries: NDArray[np.unsignedinteger]
+    """(k,) representative of each combination."""
     moduli: Array
+    """(r, 8) coarse moduli of the representatives, in the unit of the materials."""
     poisson: float
+    """Poisson's ratio of all materials."""
     radius: float
+    """Largest distance of a metamaterial from its representative, |log E - log E'|."""
     seconds: float
+    """Time that building it took on one core."""
 
     @property
     def nbytes(self) -> int:

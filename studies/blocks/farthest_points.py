@@ -24,21 +24,14 @@ STEPS = 256
 
 
 class Cover(NamedTuple):
-    """Representatives of n points.
-
-    Attributes
-    ----------
-    chosen : (r,)
-        Distinct points, in the order they were picked.
-    nearest : (n,)
-        Number of the representative nearest to each point, the earlier one of equals.
-    radius : (r,)
-        Largest distance of any point from the first 1, 2, .., r representatives.
-    """
+    """Representatives of n points."""
 
     chosen: Index
+    """(r,) distinct points, in the order they were picked."""
     nearest: Index
+    """(n,) number of the representative nearest to each point, the earlier one of equals."""
     radius: Array
+    """(r,) largest distance of any point from the first 1, 2, .., r representatives."""
 
 
 def _boxes(points: Array) -> tuple[Index, Index]:

@@ -33,30 +33,20 @@ from studies.blocks.database import (
 
 @dataclass(frozen=True)
 class Method:
-    """A coarsening of blocks (n, 8).
-
-    Attributes
-    ----------
-    name
-        Unique among the methods of a table.
-    coarsen
-        What is timed: moduli (n, 8), or whatever else the method keeps of each block.
-    storage_bytes
-        Kept beforehand.
-    training_seconds
-        Spent beforehand; None if unknown.
-    flexibility
-        Coarse flexibility (n, 18, 18) for the errors, of methods without moduli.
-    clamped
-        Whether blocks have moduli beyond the range that the method was made for.
-    """
+    """A coarsening of blocks (n, 8)."""
 
     name: str
+    """Unique among the methods of a table."""
     coarsen: Callable[[Array], Array]
+    """What is timed: moduli (n, 8), or whatever else the method keeps of each block."""
     storage_bytes: int = 0
+    """Kept beforehand."""
     training_seconds: float | None = 0.0
+    """Spent beforehand; None if unknown."""
     flexibility: Callable[[Array], Array] | None = None
+    """Coarse flexibility (n, 18, 18) for the errors, of methods without moduli."""
     clamped: bool = False
+    """Whether blocks have moduli beyond the range that the method was made for."""
 
     def response(self, young: Array) -> Array:
         """What `block_error` wants: moduli (n, 8) or flexibilities (n, 18, 18)."""

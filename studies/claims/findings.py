@@ -22,21 +22,14 @@ EXACT = "HCMS + EC"
 
 @dataclass(frozen=True)
 class Finding:
-    """Measurement of one claim of the paper, and its verdict.
-
-    Attributes
-    ----------
-    verdict
-        Whether it agrees.
-    text
-        The figures, in words.
-    files
-        Tables that they are from.
-    """
+    """Measurement of one claim of the paper, and its verdict."""
 
     verdict: str
+    """Whether it agrees."""
     text: str
+    """The figures, in words."""
     files: tuple[str, ...] = ()
+    """Tables that they are from."""
 
 
 def ends(values: Iterable[float], kind: str = "times") -> str:

@@ -18,22 +18,16 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class ModePicture:
-    """A mode of the fine solid.
-
-    Attributes
-    ----------
-    mode
-        Its number, from 1.
-    displacement : (n, 3)
-        Of the nodes of the fine mesh [kg^-1/2].
-    energy, blame : (m,)
-        Shares of its strain energy and of what the coarse model misses of it in each fine cell.
-    """
+    """A mode of the fine solid."""
 
     mode: int
+    """Its number, from 1."""
     displacement: Array
+    """(n, 3) of the nodes of the fine mesh [kg^-1/2]."""
     energy: Array
     blame: Array
+    """(m,) shares of its strain energy and of what the coarse model misses of it in each fine
+    cell."""
 
 
 def write_pictures(

@@ -26,21 +26,14 @@ _SENSELESS = (
 
 @dataclass(frozen=True)
 class Folder:
-    """What is compared of a folder of results.
-
-    Attributes
-    ----------
-    path
-        Of the folder.
-    tables
-        By their path below the folder, without ending.
-    config
-        The resolved configuration; empty if the folder has none.
-    """
+    """What is compared of a folder of results."""
 
     path: Path
+    """Of the folder."""
     tables: dict[str, Table]
+    """By their path below the folder, without ending."""
     config: dict[str, Any]
+    """The resolved configuration; empty if the folder has none."""
 
 
 def read_folder(path: str | Path) -> Folder:

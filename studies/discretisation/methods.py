@@ -57,32 +57,22 @@ class _Clock:
 
 @dataclass(frozen=True)
 class Ways:
-    """All ways for one solid, each from its surface on; on this rank alone.
-
-    Attributes
-    ----------
-    surface, name, components
-        See `carillon.fem.geometry.voxelize`.
-    resolution
-        Voxels along the longest side.
-    material
-        Young's modulus at any place, by the lattice of the voxels.
-    constants
-        Poisson's ratio and density [kg/m^3].
-    coarsening
-        For its blocks.
-    modes
-        Number of modes, rigid ones included.
-    """
+    """All ways for one solid, each from its surface on; on this rank alone."""
 
     surface: Surface
     name: str
     components: str
+    """See `carillon.fem.geometry.voxelize`."""
     resolution: int
+    """Voxels along the longest side."""
     material: PlacedMaterial
+    """Young's modulus at any place, by the lattice of the voxels."""
     constants: Constants
+    """Poisson's ratio and density [kg/m^3]."""
     coarsening: Coarsening
+    """For its blocks."""
     modes: int
+    """Number of modes, rigid ones included."""
 
     @property
     def named(self) -> dict[str, Callable[[], TimedSpectrum]]:

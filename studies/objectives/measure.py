@@ -84,24 +84,17 @@ def rate_objectives(
 
 @dataclass(frozen=True)
 class _Solid:
-    """The solid to coarsen, on rank 0 alone.
-
-    Attributes
-    ----------
-    e
-        (mc, 8) fine moduli of the blocks.
-    coarsenings
-        To rate, by the names of their rows.
-    forest, reason
-        The forests, or None and why.
-    """
+    """The solid to coarsen, on rank 0 alone."""
 
     problem: Problem
     blocks: Blocks
     e: Array
+    """(mc, 8) fine moduli of the blocks."""
     coarsenings: dict[str, Coarsening]
+    """To rate, by the names of their rows."""
     forest: ForestCoarsening | None
     reason: str
+    """The forests, or None and why."""
 
 
 def _read(options: ProblemOptions, objectives: Sequence[str]) -> _Solid:

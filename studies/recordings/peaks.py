@@ -28,21 +28,14 @@ _MEDIAN_STEPS = 50
 
 @dataclass(frozen=True)
 class Peaks:
-    """Strong peaks of a spectrum.
-
-    Attributes
-    ----------
-    hertz : (n,) [Hz]
-        Ascending.
-    decibels : (n,) [dB]
-        Levels below that of the loudest.
-    resolution : float [Hz]
-        One over the length of the clip.
-    """
+    """Strong peaks of a spectrum."""
 
     hertz: Array
+    """(n,) [Hz]: ascending."""
     decibels: Array
+    """(n,) [dB]: levels below that of the loudest."""
     resolution: float
+    """float [Hz]: one over the length of the clip."""
 
     def missed(self, frequencies: Array) -> Flags:
         """Which peaks (n,) none of the `frequencies` (m,) [Hz] accounts for."""

@@ -25,28 +25,19 @@ CALIBRATION, HELD_BACK = SPLITS = ("calibration", "held back")
 
 @dataclass(frozen=True)
 class RecordedStrike:
-    """A file of a package that holds one strike.
-
-    Attributes
-    ----------
-    name
-        Of its page.
-    package, file
-        The package, and the file below the package's folder of sounds.
-    kind
-        What was struck.
-    tonal
-        Whether a few modes ring clear of each other and of the noise.
-    split
-        One of `SPLITS`.
-    """
+    """A file of a package that holds one strike."""
 
     name: str
+    """Of its page."""
     package: str
     file: str
+    """The package, and the file below the package's folder of sounds."""
     kind: str
+    """What was struck."""
     tonal: bool
+    """Whether a few modes ring clear of each other and of the noise."""
     split: str
+    """One of `SPLITS`."""
 
     @property
     def title(self) -> str:

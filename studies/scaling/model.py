@@ -45,21 +45,14 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class MachineRates:
-    """What a rank and a link do per second.
-
-    Attributes
-    ----------
-    rates
-        Operations per second by kind of phase.
-    latency
-        Seconds a message.
-    bandwidth
-        Bytes per second.
-    """
+    """What a rank and a link do per second."""
 
     rates: dict[str, float]
+    """Operations per second by kind of phase."""
     latency: float = ASSUMED_LATENCY
+    """Seconds a message."""
     bandwidth: float = ASSUMED_BANDWIDTH
+    """Bytes per second."""
 
     def predict(self, work: Work) -> dict[str, float]:
         """Modelled seconds of every phase."""

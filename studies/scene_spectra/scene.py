@@ -20,21 +20,14 @@ SCENE, SOUND, TOLD = "scene.yaml", "scene.wav", "scene.json"
 
 @dataclass(frozen=True)
 class Rendering:
-    """Modes by which the scene is heard.
-
-    Attributes
-    ----------
-    title
-        Their name for people.
-    about
-        What they are, in a few words.
-    how
-        Options of `solver modes`.
-    """
+    """Modes by which the scene is heard."""
 
     title: str
+    """Their name for people."""
     about: str
+    """What they are, in a few words."""
     how: Mapping[str, Any]
+    """Options of `solver modes`."""
 
 
 RENDERINGS = {name: Rendering(**told) for name, told in DESCRIBED["renderings"].items()}

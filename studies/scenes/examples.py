@@ -54,27 +54,19 @@ DIGITS = 4
 
 @dataclass(frozen=True)
 class SceneExample:
-    """One scene.
-
-    Attributes
-    ----------
-    name, title, figure, about
-        Short name, heading, what it follows in the paper, and a sentence.
-    designs
-        Examples of sound design whose solids are in it, each named once.
-    content
-        Of its file; None if there is none.
-    notes
-        Of a row of bars, which needs no file.
-    """
+    """One scene."""
 
     name: str
     title: str
     figure: str
     about: str
+    """Short name, heading, what it follows in the paper, and a sentence."""
     designs: tuple[str, ...] = ()
+    """Examples of sound design whose solids are in it, each named once."""
     content: Mapping[str, Any] | None = None
+    """Of its file; None if there is none."""
     notes: str = ""
+    """Of a row of bars, which needs no file."""
 
     @property
     def files(self) -> list[str]:

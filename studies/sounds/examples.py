@@ -51,22 +51,15 @@ class ExampleTarget:
 
 @dataclass(frozen=True)
 class Recording:
-    """A solid whose strikes are the clips.
-
-    Attributes
-    ----------
-    axis, jump
-        Coordinate x, y or z, and its value [m], at which the modulus jumps.
-    young
-        Moduli [Pa] below and above it.
-    damping
-        Rayleigh's coefficients of mass [1/s] and stiffness [s].
-    """
+    """A solid whose strikes are the clips."""
 
     axis: str
     jump: float
+    """Coordinate x, y or z, and its value [m], at which the modulus jumps."""
     young: tuple[float, float]
+    """Moduli [Pa] below and above it."""
     damping: tuple[float, float]
+    """Rayleigh's coefficients of mass [1/s] and stiffness [s]."""
 
     def moduli(self, centres: Array) -> Array:
         """Moduli (m,) [Pa] of cells with `centres` (m, 3) [m]."""
@@ -76,41 +69,30 @@ class Recording:
 
 @dataclass(frozen=True)
 class Example:
-    """One example on the solid whose mesh is there.
-
-    Attributes
-    ----------
-    name, title, figure, about
-        Short name, heading, what it follows in the paper, and a sentence.
-    mesh, resolution, density, modes, dimensions, seconds
-        See `sound.project.project.Project`.
-    targets
-        In the order of their edits.
-    elsewhere
-        Name and position of a point without a target that is struck, too.
-    compared
-        Whether the optimisers are compared on it.
-    recorded
-        What its clips are strikes of; None if they are synthesised.
-    weights
-        Of the cost, those that are not as usual.
-    """
+    """One example on the solid whose mesh is there."""
 
     name: str
     title: str
     figure: str
     about: str
+    """Short name, heading, what it follows in the paper, and a sentence."""
     mesh: str
     resolution: int
     density: float
     modes: int
     dimensions: int
     seconds: float
+    """See `sound.project.project.Project`."""
     targets: tuple[ExampleTarget, ...]
+    """In the order of their edits."""
     elsewhere: tuple[str, tuple[float, float, float]]
+    """Name and position of a point without a target that is struck, too."""
     compared: bool
+    """Whether the optimisers are compared on it."""
     recorded: Recording | None = None
+    """What its clips are strikes of; None if they are synthesised."""
     weights: Mapping[str, float] = field(default_factory=dict)
+    """Of the cost, those that are not as usual."""
 
     @property
     def edits(self) -> int:

@@ -21,28 +21,20 @@ LONGEST_NAME = 100
 
 @dataclass(frozen=True)
 class Limits:
-    """What the server bears.
-
-    Attributes
-    ----------
-    mesh_bytes, clip_bytes, message_bytes
-        Of uploaded files, and of what the page says on its WebSocket.
-    idle_seconds, upload_seconds
-        Time in which an upload has to go on, and to end.
-    uploads, connections
-        How many may go on, and be open, at a time.
-    waiting_seconds
-        Time in which a connection has to ask for something that it may have.
-    """
+    """What the server bears."""
 
     mesh_bytes: int = 64 << 20
     clip_bytes: int = 16 << 20
     message_bytes: int = 1 << 18
+    """Of uploaded files, and of what the page says on its WebSocket."""
     idle_seconds: float = 10.0
     upload_seconds: float = 600.0
+    """Time in which an upload has to go on, and to end."""
     uploads: int = 4
     connections: int = 200
+    """How many may go on, and be open, at a time."""
     waiting_seconds: float = 10.0
+    """Time in which a connection has to ask for something that it may have."""
 
 
 class UploadError(Exception):

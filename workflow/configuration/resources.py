@@ -12,21 +12,14 @@ from carillon.parameters import option, parameters
 
 @dataclass(frozen=True)
 class JobLimits:
-    """What a job of a rule may take at first; one that ran out of it gets twice as much.
-
-    Attributes
-    ----------
-    what
-        What the rule makes.
-    memory_mb
-        Memory [MB]; None if the rule works it out.
-    minutes
-        Wall time [min].
-    """
+    """What a job of a rule may take at first; one that ran out of it gets twice as much."""
 
     what: str
+    """What the rule makes."""
     memory_mb: int | None
+    """Memory [MB]; None if the rule works it out."""
     minutes: int
+    """Wall time [min]."""
 
 
 LIMITS = {

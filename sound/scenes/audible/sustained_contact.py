@@ -35,31 +35,24 @@ _LATTICE_RMS = 0.49
 
 @dataclass(frozen=True)
 class SustainedForce:
-    """The sustained force between two bodies, in blocks of samples.
-
-    Attributes
-    ----------
-    pair
-        Numbers of the bodies.
-    contacts, vertices, shares
-        Points of contact in the order of time, nearest vertices of both bodies, and sustained
-        shares of the forces.
-    blocks, firsts, steps : (b,)
-        Numbers of the blocks with a force, ascending; in each, number of the first point, and
-        number of the engine's steps with a force.
-    courses, dashpots : (b, BLOCK), (b,) [N s/m]
-        Fluctuation of the force over its mean, and dashpot of the contact.
-    """
+    """The sustained force between two bodies, in blocks of samples."""
 
     pair: tuple[int, int]
+    """Numbers of the bodies."""
     contacts: ContactPoints
     vertices: NDArray[np.integer]
     shares: Array
+    """Points of contact in the order of time, nearest vertices of both bodies, and sustained shares
+    of the forces."""
     blocks: Index
     firsts: Index
     steps: Index
+    """(b,) numbers of the blocks with a force, ascending; in each, number of the first point, and
+    number of the engine's steps with a force."""
     courses: Array
     dashpots: Array
+    """(b, BLOCK), (b,) [N s/m]: fluctuation of the force over its mean, and dashpot of the
+    contact."""
 
     def mean(self, values: Array) -> Array:
         """Sums of values (c, ...) over the points of each block, mean over its steps (b, ...)."""
