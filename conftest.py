@@ -1,7 +1,5 @@
 """Fixtures that every test may use: MPI runs, command-line runs, the meshes beside the checkout."""
 
-from __future__ import annotations
-
 import asyncio
 import hashlib
 import inspect

@@ -5,8 +5,6 @@ commands, some of them by shorter names. `carillon study` lists the studies; tho
 commands of a room before are still found by their names alone.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Types of arrays and surfaces in annotations, and arrays that nobody changes."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What packages export, loaded when first asked for, where loading it takes long."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any

@@ -4,8 +4,6 @@ Far wider than anything that has been struck, and narrow enough that no product 
 leaves the range of double precision, and that voxels have distinct places.
 """
 
-from __future__ import annotations
-
 from carillon.errors import UserError
 
 EXTENTS = (1e-9, 1e9)

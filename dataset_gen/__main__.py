@@ -1,7 +1,5 @@
 """Command line: `python -m dataset_gen generate | benchmark | inspect`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

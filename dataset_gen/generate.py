@@ -1,7 +1,5 @@
 """Draw samples and fit them, over as many workers as asked for, with the same result for any."""
 
-from __future__ import annotations
-
 import json
 import logging
 import shutil

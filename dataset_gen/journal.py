@@ -6,8 +6,6 @@ software and machine the work that follows was done on, `TASK` frames hold the r
 frame that is cut off or whose checksum differs ends the journal; what follows it is thrown away.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import os

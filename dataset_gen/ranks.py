@@ -1,7 +1,5 @@
 """Tasks shared among MPI ranks: each does every so-manieth, rank 0 writes all of them in order."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Callable, Generator

@@ -3,8 +3,6 @@
 Sample i depends on the seed and on i alone, however a range is split over jobs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,7 +1,5 @@
 """How fast a shard was written or read, and in how much memory: the figures of every run."""
 
-from __future__ import annotations
-
 import resource
 import time
 from pathlib import Path

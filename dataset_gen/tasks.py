@@ -1,7 +1,5 @@
 """The work on a shard, cut into tasks that any process can do and that end up in order."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Generator
 from concurrent.futures.process import BrokenProcessPool

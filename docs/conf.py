@@ -1,7 +1,5 @@
 """How Sphinx makes the documentation; `make docs` calls it."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

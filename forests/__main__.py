@@ -1,7 +1,5 @@
 """Command line: `python -m forests COMMAND`; `--help` lists the commands."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Coarsenings without training, to compare the forests with (Fig. 9)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -1,7 +1,5 @@
 """Where the forests lie that come with the package."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from carillon.errors import UserError

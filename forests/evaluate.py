@@ -1,7 +1,5 @@
 """Coarse moduli of a whole mesh, and their derivatives, in one compiled pass."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

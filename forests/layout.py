@@ -3,8 +3,6 @@
 `prefetch` asks for memory before it is needed, which numba has no function for.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

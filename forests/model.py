@@ -1,7 +1,5 @@
 """The trained forests as plain arrays, and their HDF5 file. Never a pickle."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -6,8 +6,6 @@ Equal neighbours are sorted by the face diagonal opposite their axis, then to th
 block and its 48 images give the same moduli in the same order, void cells included.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

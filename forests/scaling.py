@@ -8,8 +8,6 @@ What holds for one block is compiled in place wherever it is needed: in the eval
 in `prepare`, which makes the rows to train on.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Command line: `python -m sound extract | clip | init | design | render | export | benchmark`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

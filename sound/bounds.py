@@ -1,7 +1,5 @@
 """Bounds of sounds that are read or made; beyond them is a mistake, or too much for memory."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from carillon.errors import UserError

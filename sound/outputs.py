@@ -1,7 +1,5 @@
 """Names of files that commands write; the endings name the formats."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The struck surface, that of a mesh refined to have a vertex near every point, and its points."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -7,8 +7,6 @@ rules (`rules.smk`) and tests. Whoever adds or removes the folder adds or remove
 `LIMITS`, memory and time of its rules. `base` is what all of them stand on.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType

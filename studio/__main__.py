@@ -1,7 +1,5 @@
 """Command line: `python -m studio studio`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

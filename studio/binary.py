@@ -1,7 +1,5 @@
 """Arrays with a header, as the page reads them without copying: surfaces and banks of modes."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping

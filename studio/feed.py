@@ -1,7 +1,5 @@
 """Messages to pages, in order, without a backlog: of what only the newest counts, it is sent."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections import OrderedDict

@@ -1,7 +1,5 @@
 """What the studio's server asks of whoever holds the state: the answers to the page's requests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol

@@ -1,7 +1,5 @@
 """Arguments of commands as lists of words, which rules quote one by one (`{params.NAME:q}`)."""
 
-from __future__ import annotations
-
 import os
 import shlex
 from collections.abc import Mapping

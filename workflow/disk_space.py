@@ -1,7 +1,5 @@
 """Folders for results, and whether there is room in them; a job on a full disk cannot say so."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from pathlib import Path

@@ -5,8 +5,6 @@ cannot take away. The kernel's lock on a file ends with its process: every run h
 and whoever gets it alone knows that the notes of a run that did not end properly are stale.
 """
 
-from __future__ import annotations
-
 import atexit
 import fcntl
 import json

@@ -13,8 +13,6 @@ whereupon Snakemake looks for its files; `sacct` answers by `squeue` where it ca
 It runs as a program of its own, with nothing but the standard library.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Meshes that kept tables rest on: whether files of their names are the same files."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path

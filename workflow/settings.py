@@ -1,7 +1,5 @@
 """The configuration: one file describes a run, `workflow.configuration` what it leaves out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType

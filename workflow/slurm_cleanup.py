@@ -5,8 +5,6 @@ would run on beside the jobs that the next run submits for the same files. The n
 first: what they have finished stands in journals, from which its own jobs go on.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -5,8 +5,6 @@ Its process tells what happens in lines of JSON: how many steps there are, how m
 what went wrong.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """Solids of a study whose meshes may be missing, and which are then left out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ Reading all files of the project takes a second, at every start of Snakemake and
 cluster; what was read is therefore kept beside the compiled modules.
 """
 
-from __future__ import annotations
-
 import ast
 import atexit
 import hashlib

@@ -5,8 +5,6 @@ fingerprint of the modules that do its work as one of its parameters. Comments, 
 texts do not count.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from functools import cache

@@ -4,8 +4,6 @@ Snakemake hands the command line of a run on to its jobs in double quotes, in wh
 for `$`, backticks, quotes and backslashes.  Of a configuration that is but the name of its file.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Forests that the workflow trains: their data, shard by shard, and how they are trained."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The solver runs that every model goes through, and what they are called."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Command-line arguments whose mistakes are answered in one sentence."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Programs made of commands, each a module that is imported only when it is asked for."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """What the numerical environment consists of, and whether it is slow."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """How every command-line program of Carillon ends: cleanly, with one sentence when input is bad."""
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -4,8 +4,6 @@ Modules log under their own names, `logging.getLogger(__name__)`; whoever import
 the standard library what becomes of it.
 """
 
-from __future__ import annotations
-
 import logging
 from functools import cache
 

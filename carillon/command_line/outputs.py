@@ -1,7 +1,5 @@
 """What all commands with `--out`, `--plot` and `--pictures` check before they begin."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ Numbering: fine cell `j` of the block and coarse corner `c` use the bit order of
 matrices are for fine edge 1 and unit modulus or density.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import permutations, product
 

@@ -4,8 +4,6 @@ Local numbering: corner and quadrature point `c` sit at the bits `(c & 1, c >> 1
 along (x, y, z); degree of freedom `3 c + i` is the displacement of corner `c` along axis `i`.
 """
 
-from __future__ import annotations
-
 from functools import cache, lru_cache
 
 import numpy as np

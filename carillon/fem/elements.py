@@ -1,7 +1,5 @@
 """Elements with material, wherever their nodes are: what the matrices are summed from."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, Self, cast

@@ -1,7 +1,5 @@
 """The elastic solid that K u = lambda M u is assembled from, and its mass, centre and inertia."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, Self, TypedDict, Unpack, cast

@@ -1,7 +1,5 @@
 """Young's moduli of a solid, one a cell or one a quadrature point: given, made, or from a file."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 What killed writers leave under temporary names is removed by the next one.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import stat

@@ -6,8 +6,6 @@ everything is found every time. Nothing of another user's is read, nor what othe
 entry is as good as a result that nobody checks again.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Callable

@@ -4,8 +4,6 @@ A few kilobytes of HDF5 can stand for any number of bytes: one group under many 
 are compressed or far larger than their dataset, many texts that are one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import cache, partial

@@ -3,8 +3,6 @@
 A seal tells that a file is as it was written, not that what was written makes sense.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

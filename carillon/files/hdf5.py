@@ -1,7 +1,5 @@
 """HDF5 files that are complete or absent, checked when they are opened."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

@@ -1,7 +1,5 @@
 """Locks that die with their process: who comes second is told so, instead of doing work twice."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import logging

@@ -1,7 +1,5 @@
 """What may be read and what may be written to: regular files, by names that everything can hold."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

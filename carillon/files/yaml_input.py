@@ -1,7 +1,5 @@
 """YAML that people write, read with bounds; what is hostile or broken is one sentence."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from pathlib import Path

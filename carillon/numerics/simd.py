@@ -7,8 +7,6 @@ How many lanes there are is the processor's, see `carillon.numerics.simd_width`;
 computes does not depend on it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import operator
 from collections.abc import Callable

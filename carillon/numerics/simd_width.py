@@ -5,8 +5,6 @@ and NUMBA_CPU_FEATURES name. No list of processors could tell; the compiler can,
 that its code puts eight doubles into.
 """
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

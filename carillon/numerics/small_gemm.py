@@ -6,8 +6,6 @@ half the time.  Blocks are arrays of lanes (see `carillon.numerics.simd`), row b
 of a row side by side and filled up with zeros.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Command lines made from dataclasses of parameters."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Dataclasses of parameters from the keys and values of YAML files."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

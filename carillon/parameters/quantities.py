@@ -1,7 +1,5 @@
 """Annotations of the quantities that commands, files and calls share: limits, unit and meaning."""
 
-from __future__ import annotations
-
 from typing import Annotated, TypeVar
 
 from carillon.limits import DENSITIES, MODULI, POISSON, RESOLUTIONS, UNITS

@@ -1,7 +1,5 @@
 """JSON schemas of dataclasses of parameters, for pages and documentation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Which BLAS numpy, scipy and PETSc have loaded in this process."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -4,8 +4,6 @@ Ctrl-C and the signals of schedulers go to all processes of a job. Only the one 
 others hears them: it says when they end. They own nothing, so they are killed whatever they do.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

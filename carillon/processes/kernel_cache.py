@@ -6,8 +6,6 @@ user's, or a container, without a home. Then they go into a private folder for t
 where there is none either, they are compiled every time.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Context managers in which modules of libraries are loaded, whoever imports them first."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """Memory of the machine, and what a process may do to it."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

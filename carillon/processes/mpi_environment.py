@@ -14,8 +14,6 @@ sees the step, looks for the way, and aborts; without the step's number it start
 Likewise `mpiexec` of another MPI. Such ranks do not know each other, and are told so.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat

@@ -11,8 +11,6 @@ word to a process that has just ended.  Python ignores the signal and raises Bro
 programs can deal with.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 import threading

@@ -6,8 +6,6 @@ holds code, matplotlib reads `matplotlibrc`, petsc4py a `petsc.cfg` that names a
 Snakemake looks for modules in `.snakemake/pip-deployments`. None of these counts here.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator, MutableMapping, Sequence

@@ -1,7 +1,5 @@
 """The MPI ranks of this job, for programs that do without MPI if there is one rank alone."""
 
-from __future__ import annotations
-
 import os
 import sys
 from typing import Any

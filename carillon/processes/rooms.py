@@ -4,8 +4,6 @@ So an installation takes one name among the packages of an environment, whatever
 `solver` or `workflow` there. A process that imports `carillon` then finds Carillon's rooms first.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import MutableSequence
 

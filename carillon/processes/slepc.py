@@ -1,7 +1,5 @@
 """SLEPc, loaded after PETSc, which then reads no settings from files; see `petsc`."""
 
-from __future__ import annotations
-
 import carillon.processes.petsc  # noqa: F401
 from carillon.processes.present_folder import elsewhere
 

@@ -5,8 +5,6 @@ must be the same bits on any machine runs with one thread of BLAS, too (`@blas_t
 sum that threads share rounds differently.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 from collections.abc import Callable, Iterator, Sequence

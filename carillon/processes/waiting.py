@@ -6,8 +6,6 @@ message.  To yield the core (`mpi_yield_when_idle`) helps where ranks are alone;
 get it for their whole turn.  A rank that sleeps for a moment is woken at once.
 """
 
-from __future__ import annotations
-
 import atexit
 import ctypes
 import os

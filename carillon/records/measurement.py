@@ -1,7 +1,5 @@
 """Provenance of what was timed: also vector registers, memory, ranks, threads and date."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any

@@ -1,7 +1,5 @@
 """Where a number comes from: commit, versions, machine, command line, configuration."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

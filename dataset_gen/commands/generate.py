@@ -4,8 +4,6 @@ A shard that was begun goes on where it stopped.  Its bytes do not depend on the
 of MPI ranks, or of interruptions: mpiexec -n RANKS python -m mpi4py -m dataset_gen generate ...
 """
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.command_line import exit_status

@@ -1,7 +1,5 @@
 """Validate a shard of training data, and say what is in it."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import replace

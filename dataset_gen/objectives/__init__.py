@@ -6,8 +6,6 @@ symmetries. Each lives in the module of its name, with a function `fit_pattern`.
 The names are here; what fits by them, in `fitting`, takes a while to load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 

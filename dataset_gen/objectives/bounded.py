@@ -1,7 +1,5 @@
 """Eight unknowns, bounded below: the small least-squares problem at the end of every linear fit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array, Flags

@@ -12,8 +12,6 @@ stays homogeneous of degree one, and factors that are equal on octants which the
 symmetries exchange keep it equivariant.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

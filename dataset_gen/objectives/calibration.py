@@ -4,8 +4,6 @@ They are few: per class of void patterns one factor for every set of octants tha
 symmetries exchange, two exponents, and one share of lumped mass.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ takes over the displacements of the corners and shall store the same energy. A v
 displacement; it continues the trilinear motion nearest to the active nodes.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

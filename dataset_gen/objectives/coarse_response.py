@@ -4,8 +4,6 @@
 straining motions, orthonormal on the active nodes, and `B(E) = (sum_q E_q S_q^T S_q)^-1`.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

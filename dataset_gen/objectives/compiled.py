@@ -1,7 +1,5 @@
 """How the fits are compiled, and how large a matrix of lanes stays in registers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from carillon.numerics.simd import compiler

@@ -6,8 +6,6 @@ use all of the Hessian. Eq. (8) has saddles where a block is symmetric: nearly s
 leave them, symmetric ones, which have no reason to prefer a side, end there.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

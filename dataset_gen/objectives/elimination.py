@@ -5,8 +5,6 @@ the nodes is that of least degree, so the corners of the block, which touch one 
 the node in the middle last; the factor of the full block then has 215 tiles instead of 378.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

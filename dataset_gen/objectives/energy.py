@@ -7,8 +7,6 @@ element's 18 straining motions; in a basis V of what nodal forces feel of them, 
 active nodes, the coarse flexibility is `V B V^T` with `B(E) = (sum_q E_q A_q)^-1`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

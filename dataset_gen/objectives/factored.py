@@ -7,8 +7,6 @@ answers contrast well, but is too stiff where cells are void. Without void cells
 `oversampled`, for one material `inertial`.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

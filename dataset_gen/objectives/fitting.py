@@ -1,7 +1,5 @@
 """Coarse moduli of many blocks by any objective."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib import import_module
 from types import ModuleType

@@ -4,8 +4,6 @@ Counted from the tables that steer it, as they are carried out: all nine numbers
 diagonal, and a multiplication and an addition for each term of a product.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar

@@ -4,8 +4,6 @@ Springs at just enough unknowns hold the motions without strain. Loads in self-e
 strain them, so the answer is exact up to such a motion, and the stiffness stays sparse.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 A block inside the solid is held by its neighbours; one at a void surface moves freely there.
 """
 
-from __future__ import annotations
-
 from carillon.arrays import Array
 from carillon.fem.block import ALL_FILLED
 from dataset_gen.objectives import inertial, oversampled

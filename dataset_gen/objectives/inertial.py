@@ -1,7 +1,5 @@
 """Objective `inertial`: the block, free all round, under the inertia of trilinear motions."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ tuples (array, first entry, stride, stride). The factorised matrices consist of 
 order of `dataset_gen.objectives.elimination`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

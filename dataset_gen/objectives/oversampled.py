@@ -5,8 +5,6 @@ of the patch has one modulus. Trilinear fields are prescribed on the patch's bou
 block's own 27 nodes are free.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What a void pattern alone decides about a block, computed once for each of the 255 patterns."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

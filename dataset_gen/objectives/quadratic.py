@@ -1,7 +1,5 @@
 """Moduli that reproduce the energies of given motions: the step all linear objectives share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple, Protocol, TypeVar
 

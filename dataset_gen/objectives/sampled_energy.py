@@ -4,8 +4,6 @@ Kept to check `energy`, to measure what its closed form saves, and to fit datase
 One block at a time: here the lanes are forces.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Help of the commands as Markdown, from the parsers that the commands themselves use."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Pictures lie in `docs/gallery`, so that pages are made in seconds. They are draw
 scripts, all or those that are named.
 """
 
-from __future__ import annotations
-
 import ast
 import shutil
 import subprocess

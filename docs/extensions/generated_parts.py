@@ -1,7 +1,5 @@
 """Parts of pages that are made from the sources: `<!-- made here: NAME WORDS -->` is replaced."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Equations as MathML, which browsers show by themselves: pages need no scripts and no network."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Keys of dataclasses of parameters as lists: type, limits, unit, default and meaning."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from collections.abc import Iterator

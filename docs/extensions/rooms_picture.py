@@ -1,7 +1,5 @@
 """Pictures of the packages: boxes and arrows as SVG, from the arrows that the tests allow."""
 
-from __future__ import annotations
-
 from graphlib import TopologicalSorter
 from html import escape
 

@@ -4,8 +4,6 @@ Snakemake says which rule of the default run needs which; Graphviz, which nothin
 out what follows from other arrows and lays out the rest.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Keys of the configuration, of projects and of scenes as lists; their materials as a table."""
 
-from __future__ import annotations
-
 import parameter_tables
 
 from sound.project.project import Project

@@ -3,8 +3,6 @@
 `forests train --structure` takes the trees that such jobs have grown.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 

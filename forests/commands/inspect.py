@@ -1,7 +1,5 @@
 """Validate a file of forests, and say what is in it."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -3,8 +3,6 @@
 On several ranks the forests are the same: mpiexec -n RANKS python -m mpi4py -m forests train ...
 """
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.command_line.progress import say

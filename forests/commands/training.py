@@ -1,7 +1,5 @@
 """The arguments of all commands that train."""
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.parameters.command_line import add_options, reader

@@ -6,8 +6,6 @@ is the one that leaves the least error of two linear fits. Each void pattern, se
 has a root of its own; splits are made where they gain most until the leaves are used up.
 """
 
-from __future__ import annotations
-
 from heapq import heappop, heappush
 
 import numba

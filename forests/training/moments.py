@@ -4,8 +4,6 @@ With z = (x_1..x_7, 1, t) the sums are `sum w z z^T`, lower triangle by rows. Th
 rows, chunks, ranks, and up a tree.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

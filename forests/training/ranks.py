@@ -1,7 +1,5 @@
 """The ranks that train one model together, or one process alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 

@@ -1,7 +1,5 @@
 """How well forests reproduce the fits they were trained on."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -1,7 +1,5 @@
 """First step of the training (section 7.1.3): where a tree splits, from a subset of the rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

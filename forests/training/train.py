@@ -1,7 +1,5 @@
 """Train both forests on fitted blocks and score them on blocks held out."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """One grown tree in a file, for trainings whose trees are grown by jobs of their own."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import fields

@@ -8,8 +8,6 @@ they join in (Bank and Smith 1993). It is a lower bound of the error, since more
 only lower the frequency further.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, lru_cache
 

@@ -1,7 +1,5 @@
 """Finite cells of which those with the largest errors are divided."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

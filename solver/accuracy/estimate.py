@@ -7,8 +7,6 @@ place by place, r = L4 / L2 - 1 and e = L2 / (r - 1): Richardson's extrapolation
 solve. What none of these cells can do is added, see `solver.accuracy.cubics`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

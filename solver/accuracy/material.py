@@ -1,7 +1,5 @@
 """A material as a function of place, so that solids on any lattice have the same one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from typing import Self

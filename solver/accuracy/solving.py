@@ -1,7 +1,5 @@
 """The modes of a solid as accurate as is requested: refined, at a resolution that is enough."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

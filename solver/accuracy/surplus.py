@@ -5,8 +5,6 @@ eight cells, or 64, are replaced by one of as much edge, with the displacements 
 nearest in energy, tells how fast the modes converge at that place.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components

@@ -1,7 +1,5 @@
 """How far the frequencies of voxels are from those of the solid, by finite cells."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

@@ -1,7 +1,5 @@
 """How many modes can be asked for, and how many are kept to find them."""
 
-from __future__ import annotations
-
 from typing import cast
 
 from mpi4py import MPI

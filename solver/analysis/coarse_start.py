@@ -1,7 +1,5 @@
 """Modes of the coarsened solid on its fine mesh, as a start for those of the fine solid."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

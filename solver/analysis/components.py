@@ -1,7 +1,5 @@
 """Modes of a mesh by component mode synthesis, for any material on it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Corrected modes: from random vectors, HCMS, or the modes of a similar or a coarser solid."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

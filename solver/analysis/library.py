@@ -1,7 +1,5 @@
 """The solver as a function: arrays in, arrays out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a modal analysis finds, and what another may start from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

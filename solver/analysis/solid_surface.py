@@ -1,7 +1,5 @@
 """The surface of a solid, read once for all that is made of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

@@ -5,8 +5,6 @@ as registers hold: nothing is stored before it is complete. What a column comes 
 on the columns beside it.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sparse matrices from element matrices, block by block."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

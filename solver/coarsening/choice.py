@@ -1,7 +1,5 @@
 """The coarsening that a name and its options stand for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

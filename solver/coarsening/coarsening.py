@@ -1,7 +1,5 @@
 """What all coarsenings have in common."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 from carillon.arrays import Array

@@ -1,7 +1,5 @@
 """Coarsening by regression forests: a file that is named, or those that come with the package."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

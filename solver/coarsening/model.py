@@ -1,7 +1,5 @@
 """From the fine mesh to the mesh of its 2x2x2 blocks (section 7.1)."""
 
-from __future__ import annotations
-
 from typing import Unpack
 
 import numpy as np

@@ -4,8 +4,6 @@ What is wrong is said in a sentence each; with --strict it makes the exit status
 assembled anew from what the files say of the solid.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 

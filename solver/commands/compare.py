@@ -1,7 +1,5 @@
 """Errors of the eigenvalues and modes of modes files, another being taken for the truth."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

@@ -4,8 +4,6 @@ It may be started on several ranks, with the same result:
 mpiexec -n RANKS python -m mpi4py -m solver modes ...
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -1,7 +1,5 @@
 """What `modes` says of its result: attributes of the file, JSON, and a few lines of text."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

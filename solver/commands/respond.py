@@ -1,7 +1,5 @@
 """Strike a solid: its motion and sound by several spectra, one being taken for the truth."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What the solver's commands share: ranks and threads, PETSc's errors, outputs and their origin."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """One step of the error correction: a better subspace from corrections of the Ritz vectors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Error correction by accelerated subspace iteration (section 7.2.1, Eq. 16-21)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -6,8 +6,6 @@ those project K anew.  Its blocks become orthonormal by Cholesky, theirs by eige
 matrix: one code for all would change last bits.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

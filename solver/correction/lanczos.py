@@ -6,8 +6,6 @@ common is removed from all of them by every solve.  It takes about half the righ
 correcting each mode by itself takes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

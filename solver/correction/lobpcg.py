@@ -4,8 +4,6 @@ Every step takes the lowest Ritz pairs of the span of the vectors X, their preco
 W, and the direction P that the last step took.  A cycle of multigrid is the preconditioner.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

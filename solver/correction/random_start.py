@@ -1,7 +1,5 @@
 """Modes of which little is known: block Lanczos from random vectors, or modes of a coarser mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from carillon.arrays import Array

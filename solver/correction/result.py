@@ -1,7 +1,5 @@
 """The result of an error correction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from carillon.arrays import Array

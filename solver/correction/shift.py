@@ -1,7 +1,5 @@
 """A shift amid the wanted eigenvalues, without knowing any: those below are counted by inertia."""
 
-from __future__ import annotations
-
 from math import exp, inf, log
 
 from carillon.fem.model import RIGID_MODES

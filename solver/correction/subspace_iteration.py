@@ -1,7 +1,5 @@
 """The subspace iteration of an error correction, step by step or by block Lanczos."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 Arrays travel as contiguous buffers, announced by one short message with their shapes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast

@@ -1,7 +1,5 @@
 """Who owns what: subdomains, merge tree, owner ranks, and the numbering of distributed rows."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cutting the mesh into subdomains: k-means++ on low Laplacian eigenvectors (section 7.2)."""
 
-from __future__ import annotations
-
 import warnings
 
 import numba

@@ -1,7 +1,5 @@
 """Modes that a correction starts from: read from a file or given whole, scattered to the ranks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 

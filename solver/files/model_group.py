@@ -1,7 +1,5 @@
 """Solids in files: the mesh and its material, from which K and M can be assembled again."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import h5py

@@ -1,7 +1,5 @@
 """The file `modes.h5`: eigenpairs, the model they belong to, and the evidence for them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ Every interface treatment is a restriction of the elements that straddle a group
     elements in full, taken at its own nodes (see `solver.hcms.local`).
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

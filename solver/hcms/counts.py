@@ -5,8 +5,6 @@ the synthesis scales.  Phases are `local` (modes of the subdomains), `merge 1`, 
 level of the merge tree), `down` (coefficients on their way back) and `basis` (the final vectors).
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Products of tall matrices that several ranks share by rows."""
 
-from __future__ import annotations
-
 import numpy as np
 from mpi4py import MPI
 

@@ -4,8 +4,6 @@ The modes of a subdomain only have to span a good space, so few steps from a sta
 smooth motions will do; Rayleigh-Ritz at the end makes them orthonormal and diagonalises.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import product
 

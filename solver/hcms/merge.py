@@ -8,8 +8,6 @@ where only rows of V1 and V2 at nodes of straddling cells matter.  The diagonal 
 group alone, so each is formed where the group lies.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The way up the merge tree: every merge by the ranks that the schedule has for it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from mpi4py import MPI

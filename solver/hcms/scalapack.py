@@ -4,8 +4,6 @@ It is called in the library that petsc4py has loaded, so that it is the one for 
 Matrices lie in blocks dealt out cyclically over a grid of ranks.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 from ctypes import byref, c_double, c_int, c_void_p

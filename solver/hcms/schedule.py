@@ -7,8 +7,6 @@ been given until then.  Large eigenproblems are shared by the ranks whose first 
 group, of which no two merges at the same level have one in common.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ along the tree, so that the full basis is formed once, from the small local base
 distributed by rows.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A rank's rows of any PETSc matrix in 3x3 blocks, and their products with row-major blocks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -1,7 +1,5 @@
 """Elimination of the fronts of a multifrontal factorisation, children before parents."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

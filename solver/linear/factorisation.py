@@ -1,7 +1,5 @@
 """Sparse Cholesky, LDL^T and incomplete Cholesky factorisations by what this PETSc offers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

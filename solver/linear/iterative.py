@@ -5,8 +5,6 @@ incomplete Cholesky factor, `icc-pcg`.  `amg-cg` replaces the factor by smoothed
 models that are too large to factor: its iterations hardly grow with the mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -6,8 +6,6 @@ solve is then nothing but products of dense matrices; threads share the branches
 panel pivots within itself, so the matrix need not be definite.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

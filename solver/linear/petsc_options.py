@@ -1,7 +1,5 @@
 """Options that people hand to PETSc and SLEPc, and what those say to them."""
 
-from __future__ import annotations
-
 import ctypes
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Compiled sweeps of a multifrontal solve, up and down the fronts of a part of the tree."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from carillon.numerics import small_gemm

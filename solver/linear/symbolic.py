@@ -1,7 +1,5 @@
 """Symbolic factorisation: which rows every front is coupled to, and where entries go in it."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

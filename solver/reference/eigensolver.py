@@ -1,7 +1,5 @@
 """SLEPc's Lanczos methods in shift-and-invert mode, set up in one place."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any
 

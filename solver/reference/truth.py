@@ -1,7 +1,5 @@
 """Ground truth by SLEPc: shift-and-invert Krylov-Schur or ARPACK, with proof of completeness."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

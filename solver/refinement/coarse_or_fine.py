@@ -9,8 +9,6 @@ that is decided from counts, moduli and modes, so every machine decides the same
 solid cannot be solved, for lack of memory for example, the coarse modes stand, with a warning.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Errors that frequencies are expected to have."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any
 

@@ -8,8 +8,6 @@ is from that, relative to the mode's, is the element's share of the error. It te
 to keep fine; the sum of the shares is not the error, since u is no coarse mode.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

@@ -9,8 +9,6 @@ and its inertia counts the eigenvalues below mu. If fewer are found, the coarse 
 then the iteration goes on with a shift below all of them, where the lowest grow most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Modes of the models that discretising, refining and rating a solid make."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

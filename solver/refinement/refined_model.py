@@ -1,7 +1,5 @@
 """A coarse model of which some blocks stay fine."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array, Index

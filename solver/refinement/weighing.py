@@ -5,8 +5,6 @@ block Lanczos iterations over 465 to 25,086 unknowns and 60 to 256 modes follow 
 about a third, and ratios of them better.  Its unit is none: only ratios are made use of.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -1,7 +1,5 @@
 """By how much the motion after a strike may differ if eigenvalues are accurate to a tolerance."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -1,7 +1,5 @@
 """Points of a surface where a solid is struck or watched."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Points of a solid as weights of the unknowns of its model, and the motion of modes there."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """The file `response.h5`: how one solid moves and sounds when struck, by several spectra."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The surface of a solid in any discretisation, with its normals."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 

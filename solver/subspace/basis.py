@@ -1,7 +1,5 @@
 """A mass-orthonormal basis that grows by blocks of vectors, each in one piece of memory."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Orthonormal combinations of vectors, from their Gram matrix."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rayleigh-Ritz in a block of vectors, and what it says about the first elastic eigenvalue."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 

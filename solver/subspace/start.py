@@ -1,7 +1,5 @@
 """Vectors that a search for eigenvectors starts from, whatever the number of ranks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -6,8 +6,6 @@ span of the first k Ritz vectors, and the trace of K in that span then tells by 
 derivation is in docs/explanation/trust.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

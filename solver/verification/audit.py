@@ -3,8 +3,6 @@
 The limits follow from a tolerance, see docs/explanation/trust.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path

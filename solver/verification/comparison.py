@@ -1,7 +1,5 @@
 """How far a spectrum is from another that is taken for the truth."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ K and M are assembled again from the mesh and the moduli in the file, by other c
 run that wrote it; nothing that the run said about itself is used.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which mode of one solution is which of another, by shape or by index, and how far they differ."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Candidates for the modes of a clip: damped sinusoids that ESPRIT finds in its bands."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The sound of a strike decays ever more slowly, since quick modes die away first.
 editor ends in silence, which no sum of damped sinusoids does.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

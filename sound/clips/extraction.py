@@ -9,8 +9,6 @@ signal is 20 dB above the noise, by two thirds of it at 40 dB.  Errors of resolv
 that the noise makes inevitable.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Modes of clips in files, and names of clips."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A blow lasts some milliseconds, in which it still drives the modes.  The sound o
 of damped sinusoids, and a fit that includes it has all modes wrong.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ No material glides.  A fit of modes does not show a glide, as a row of neighbour
 it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -12,8 +12,6 @@ strike, their decay, and the noise of the blow.
   length by a soft hammer.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

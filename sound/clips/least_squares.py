@@ -4,8 +4,6 @@ Sums of products of two damped sinusoids have closed forms, so the normal equati
 nothing beside its right-hand side.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 

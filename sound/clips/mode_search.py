@@ -8,8 +8,6 @@ spectra under decaying windows, are added; those that do not stand out of the no
 that ESTER may find too many.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

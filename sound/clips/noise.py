@@ -4,8 +4,6 @@ Otherwise a played rest would contain partials that were not found as modes, wit
 at any point.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -1,7 +1,5 @@
 """Targets of a design: the modes of several clips, brought to one list of frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Sound files: clips are read, unless they were cut short, and sounds are written."""
 
-from __future__ import annotations
-
 import io
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`python -m sound clip`: a synthesised clip to design after."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Options that several commands have in common."""
 
-from __future__ import annotations
-
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Count, Positive, Workers
 from sound.project.settings import Dampings, OptimiserMethod

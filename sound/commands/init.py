@@ -1,7 +1,5 @@
 """`python -m sound init`: a project file to begin with."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

@@ -1,7 +1,5 @@
 """`design --watch`: a search that takes up edits of its project and writes sounds."""
 
-from __future__ import annotations
-
 import os
 import re
 import time

@@ -1,7 +1,5 @@
 """Descent to a local optimum: its cost as a sum of squares, its limits and its record."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

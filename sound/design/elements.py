@@ -1,7 +1,5 @@
 """Elements of the analysed solid, as functions of the moduli of its voxels."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Modes of the fine solid, matched with those of the coarse solid of a search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

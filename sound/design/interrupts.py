@@ -1,7 +1,5 @@
 """Interrupts of a search: the first Ctrl-C or SIGTERM ends the search, the second the program."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ The cost is a sum of squares whose Jacobian J is known, so J^T J stands for the 
 quasi-Newton methods have to learn from gradients; it is damped as by Levenberg and Marquardt.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

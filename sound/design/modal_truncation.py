@@ -3,8 +3,6 @@
 The appendix truncates it; here a Krylov space gives it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 

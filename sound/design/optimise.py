@@ -1,7 +1,5 @@
 """The search for a design."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

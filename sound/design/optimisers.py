@@ -1,7 +1,5 @@
 """Optimisers of the material: a hybrid after appendix 3, and its two parts on their own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -8,8 +8,6 @@ method; Johnson and Kienholz, AIAA Journal 20, 1982):
     d = alpha / 2 + omega / 2 sum_r eta_r s_r .
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Frequencies as the ear spaces them: distances in cents, and critical-band rate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

@@ -4,8 +4,6 @@ What is found depends on the coordinates and on the modes that the evaluation st
 nothing that another task has done.  So results do not depend on how many processes share the work.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 from collections.abc import Callable, Sequence

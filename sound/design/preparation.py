@@ -1,7 +1,5 @@
 """Preparation of a search from a project: targets, mesh, material and objective."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, replace
 

@@ -6,8 +6,6 @@ Gauss-Newton steps end; the small matrix describes crossings.  Steps minimise th
 reduced model within a trust region, whose radius depends on the quality of the prediction [CGT00].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

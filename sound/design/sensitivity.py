@@ -7,8 +7,6 @@ would have tiny denominators; they are left out of x_k, and their products u_i^T
 one by one.  `modal_truncation` adds the modes that were not computed.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

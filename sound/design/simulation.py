@@ -1,7 +1,5 @@
 """Modes of a solid as functions of its material's coordinates, with derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ amplitudes are shifted by their difference [BCD+04].  The coarse search is then 
 material that was checked.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """HDF5: the embedded finite element mesh of the surface with its eigenpairs, the paper's output."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ Here every mode is a rotation in the plane that decays, with the impulse respons
 a exp(-d t) sin(2 pi f t) exactly.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from string import Template

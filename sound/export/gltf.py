@@ -12,8 +12,6 @@ times f_1 / f_n, f_1 being the lowest frequency: the player's sound then is the 
 asks for such data "in the same form", and the factors stand in the model's extras.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -8,8 +8,6 @@ Players that do not know the draft show the scene silently.
 glTF's y points up and the scene's z: a root node turns all of it.
 """
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The file of a design, `design.h5`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A project: the file that describes a sound design."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, replace
 from pathlib import Path

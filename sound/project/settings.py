@@ -1,7 +1,5 @@
 """Sections of a project: its targets, and how a material is sought that sounds like them."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters

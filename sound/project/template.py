@@ -1,7 +1,5 @@
 """A project file with all keys, each with what it means."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A solid to be struck, of a design or of modes, with its loudness and its surface."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Samples of strikes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

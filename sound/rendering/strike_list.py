@@ -1,7 +1,5 @@
 """Lists of strikes: tables (CSV) of times, places and impulses."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Mapping

@@ -5,8 +5,6 @@ concavity and tree search) cuts closed surfaces.  It runs in a process of its ow
 cannot be interrupted, and crashes on unexpected surfaces.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Preparation of surfaces for convex decomposition: open ones are closed, fine ones coarsened."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ K. L. Johnson, Contact Mechanics (1985), sections 4.2 and 11.4.  The effective r
 effective mass 1 / m = 1 / m1 + 1 / m2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

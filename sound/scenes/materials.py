@@ -1,7 +1,5 @@
 """Materials of solids in scenes, by name: elasticity, damping, contact and looks."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass

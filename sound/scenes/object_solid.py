@@ -1,7 +1,5 @@
 """The solid of a scene's object: of a design, a modes file, a mesh or a ball."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The result of playing a scene: surfaces, motion and camera, sound and impacts."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """A scene: the file that describes solids, how they begin to move, and who hears them."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, replace

@@ -5,8 +5,6 @@ to sample, and its sound is Im x.  Forces are added to x before a sample is take
 computed in blocks, within which the damping is constant, for all modes side by side.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -4,8 +4,6 @@ A signal is Re sum_k c_k exp(lambda_k n) at sample n = 0, 1, ..., with complex `
 `exponents` lambda = (-d + 2 pi i f) / rate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

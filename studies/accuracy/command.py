@@ -1,7 +1,5 @@
 """Rate voxels, finite cells and tetrahedra by frequencies that no mesh made, over size and time."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -1,7 +1,5 @@
 """Distances from the solid that spectra expect, beside those from a much finer lattice."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace

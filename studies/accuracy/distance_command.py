@@ -1,7 +1,5 @@
 """Rate the distances from the solid that spectra expect by spectra of a much finer lattice."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

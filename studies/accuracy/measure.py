@@ -1,7 +1,5 @@
 """Errors and times of every discretisation over its unknowns, on solids with a closed form."""
 
-from __future__ import annotations
-
 import statistics
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Frequencies of free solids by Rayleigh-Ritz with polynomials over the whole solid: no mesh."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

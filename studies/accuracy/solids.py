@@ -1,7 +1,5 @@
 """The solids of the study: their sides, surfaces, and frequencies that no mesh made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

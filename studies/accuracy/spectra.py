@@ -1,7 +1,5 @@
 """Spectra of a solid by both discretisations, with what they take."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

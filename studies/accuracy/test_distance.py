@@ -1,7 +1,5 @@
 """Expected distances from the solid are set beside those from a finer lattice."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """References that no mesh made agree with theory; discretisations approach them at their rates."""
 
-from __future__ import annotations
-
 import json
 import sys
 

@@ -3,8 +3,6 @@
 Both packages are optional, since nothing but this comparison needs them.
 """
 
-from __future__ import annotations
-
 import time
 from importlib import import_module, metadata
 from typing import Any

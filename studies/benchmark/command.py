@@ -1,7 +1,5 @@
 """Time every way to a spectrum on one solid, in alternating runs (Fig. 11)."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

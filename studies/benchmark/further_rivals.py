@@ -1,7 +1,5 @@
 """Further general eigensolvers by name, each as an expert would set it up; on one rank."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

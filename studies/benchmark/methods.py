@@ -1,7 +1,5 @@
 """Timed runs of solvers on one solid, from moduli to modes."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field, replace
 from typing import Any

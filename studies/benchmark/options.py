@@ -1,7 +1,5 @@
 """How a row of the time table is measured."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from carillon.parameters import OneOf, option, parameters

@@ -3,8 +3,6 @@
 PRIMME's block Davidson method is that of Stathopoulos & McCombs 2010.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """One row of the time table: all methods in alternating runs, with what they are worth."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 from dataclasses import asdict

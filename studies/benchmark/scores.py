@@ -1,7 +1,5 @@
 """What a row of the time table is judged by: spreads, errors and ratios whose base is named."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

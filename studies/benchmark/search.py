@@ -1,7 +1,5 @@
 """What a further rival is asked for, and how long it may take."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field

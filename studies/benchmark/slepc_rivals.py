@@ -5,8 +5,6 @@ for blocks of a dozen vectors and more, whatever the preconditioner, and crawls 
 Blocks make generalised Davidson slower.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

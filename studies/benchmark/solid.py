@@ -1,7 +1,5 @@
 """The solid of a row: meshed once, with a second material that is close to its own."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 

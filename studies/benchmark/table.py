@@ -1,7 +1,5 @@
 """The methods of the time table, each declared once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """A row of the time table: what it says of every method, and how it is measured."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Further general eigensolvers of the time table: what they find, and what is told of failures."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 

@@ -30,8 +30,6 @@ corner
     motion nearest to the active nodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -4,8 +4,6 @@ The key of a combination is the sum over the cells of (number of the cell's mate
 the cell), with m materials. A symmetry makes another key of it; the least of the 48 stands for all.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Compare every coarsening on random blocks: error, cost of a block, storage (Fig. 9)."""
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.command_line.outputs import require_outputs

@@ -4,8 +4,6 @@ The condensed element has a dense stiffness of its own, which no eight moduli re
 numbers a block, computed anew for every block.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

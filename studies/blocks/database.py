@@ -9,8 +9,6 @@ to the least of its images; the moduli found are turned back. Combinations that 
 get the mean over all turns that do it, so that the lookup is equivariant whatever stands for them.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

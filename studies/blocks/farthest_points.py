@@ -5,8 +5,6 @@ too far from to change anything: the result is that of the plain algorithm, in a
 time once the representatives are dense.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numba

@@ -1,7 +1,5 @@
 """The coarsenings of Fig. 9 under one interface."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Picture of Fig. 9: error against cost per block."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -7,8 +7,6 @@ median over the blocks. It is a ratio of squares: 0 is exact, 1 is what a rigid 
 elements that are too soft can exceed 1.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The cells of a campaign, and the command that validates each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product

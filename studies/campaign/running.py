@@ -1,7 +1,5 @@
 """Validate one cell; whatever comes of it is a result, its failure too."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import subprocess

@@ -3,8 +3,6 @@
 `python -m studies.campaign.verdict FILE` says it once more: status 1 if a cell failed.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sys

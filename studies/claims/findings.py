@@ -1,7 +1,5 @@
 """Verdict and figures of one claim of the paper, with the tables they were read from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The function that measures each claim."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from studies.claims import of_blocks, of_motion, of_times

@@ -1,7 +1,5 @@
 """Claims about single blocks (Fig. 9) and about the training of forests."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from studies.base.numbers import show

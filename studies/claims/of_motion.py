@@ -1,7 +1,5 @@
 """Claims about shapes, motion and sound (Fig. 8, Fig. 12, Fig. 13)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from studies.base.numbers import show

@@ -1,7 +1,5 @@
 """Claims about the convergence and the times of solves (Fig. 10, Fig. 11, Section 8.1)."""
 
-from __future__ import annotations
-
 from studies.base.numbers import show
 from studies.base.table import Table
 from studies.claims.findings import (

@@ -1,7 +1,5 @@
 """Which elements make single modes wrong, and where those have their energy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

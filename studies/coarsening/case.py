@@ -1,7 +1,5 @@
 """One solid coarsened, plainly and with blocks that stay fine, against its exact modes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

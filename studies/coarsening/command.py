@@ -1,7 +1,5 @@
 """Rate a coarse model mode by mode: true and expected errors, and the elements to blame."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

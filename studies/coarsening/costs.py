@@ -1,7 +1,5 @@
 """What a coarse model costs in all, with its check and whatever follows, beside the fine solid."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from operator import itemgetter

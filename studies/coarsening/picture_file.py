@@ -1,7 +1,5 @@
 """What pictures of badly coarsened modes need, in a file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

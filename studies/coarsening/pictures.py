@@ -1,7 +1,5 @@
 """Pictures of a mode that the coarse model gets wrong: its strain energy, and what is to blame."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

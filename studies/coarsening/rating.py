@@ -1,7 +1,5 @@
 """Errors of single modes of a coarse model, by number and by shape, and those expected."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

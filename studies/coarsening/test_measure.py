@@ -1,7 +1,5 @@
 """Errors of coarse models mode by mode: matching, verdicts, and the elements to blame."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The values of a table, a row each, by which two tables are merged."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from studies.base.numbers import MISSING, show

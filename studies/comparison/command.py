@@ -1,7 +1,5 @@
 """Command line of the comparison: `python -m workflow compare BASELINE RESULTS`."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

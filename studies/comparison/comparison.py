@@ -1,7 +1,5 @@
 """Two folders of results side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

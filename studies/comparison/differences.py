@@ -1,7 +1,5 @@
 """Under which conditions two folders of results were made, and where these differ."""
 
-from __future__ import annotations
-
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """The tables and the configuration that a folder of results holds."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """When a number moved beyond noise, and whether for the better: a rule for every kind of number."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The small tables of a run as text, kept for others to compare theirs with."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Two folders of results side by side: what moved, what differs, and what one of them lacks."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Follow the eigenvalues through the corrections, from several starts (Fig. 10)."""
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.parameters.command_line import collect, reader

@@ -1,7 +1,5 @@
 """What the jobs of the study take, and how they follow the corrections."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

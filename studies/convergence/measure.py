@@ -1,7 +1,5 @@
 """Eigenvalues after 0, 1, 2, ... corrections from different start vectors (Fig. 10)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, cast
 

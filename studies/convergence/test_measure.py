@@ -1,7 +1,5 @@
 """Convergence of corrections by start and acceleration (Fig. 10)."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

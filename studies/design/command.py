@@ -1,7 +1,5 @@
 """`python -m sound benchmark`: times of an evaluation, optimisers side by side."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import asdict

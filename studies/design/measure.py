@@ -1,7 +1,5 @@
 """How long an evaluation takes, and how the optimisers compare on one project."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

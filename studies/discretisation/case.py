@@ -1,7 +1,5 @@
 """One solid with one material by every way to a spectrum, against two truths."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Compare ways to a spectrum of one solid: voxels, coarse elements of them, and finite cells."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Annotated, Any

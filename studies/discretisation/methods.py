@@ -1,7 +1,5 @@
 """Ways from a surface and a material to a spectrum, timed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

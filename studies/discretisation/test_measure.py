@@ -1,7 +1,5 @@
 """Discretisations compared: lattices that nest, one material on all, truths, the command."""
 
-from __future__ import annotations
-
 import json
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Frequencies of the solid itself, by finite cells on a finer lattice, and how sure they are."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Keys of the study in the configuration, and what its jobs take."""
 
-from __future__ import annotations
-
 from dataclasses import KW_ONLY
 from typing import Literal
 

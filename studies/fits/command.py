@@ -1,7 +1,5 @@
 """Time the fits of every objective on one core, and compare them with what the core can do."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -1,7 +1,5 @@
 """Fits per second on one core: closed forms, Eq. (8) with sampled forces, and arithmetic."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """What forests cost: time of a block, of loading, against scikit-learn, and over their size."""
 
-from __future__ import annotations
-
 import logging
 import statistics
 import time

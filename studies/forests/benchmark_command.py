@@ -1,7 +1,5 @@
 """Time the evaluation of forests: a block, a mesh, loading, over the size, and scikit-learn."""
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.command_line.outputs import require_outputs

@@ -1,7 +1,5 @@
 """Train on more and more rows, and follow the error."""
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.command_line.outputs import require_outputs

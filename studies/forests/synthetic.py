@@ -1,7 +1,5 @@
 """Forests and blocks made up to measure what an evaluation costs."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

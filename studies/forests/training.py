@@ -1,7 +1,5 @@
 """How the error depends on the rows trained on, and on how the trees are made."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """Train in other ways, with leaves of equal storage in all, and compare their errors."""
 
-from __future__ import annotations
-
 import argparse
 
 from carillon.command_line.outputs import require_outputs

@@ -1,7 +1,5 @@
 """Rate the fit objectives, and forests, by the spectra of one solid that they coarsen."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

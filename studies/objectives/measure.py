@@ -3,8 +3,6 @@
 And by forests, which have learned one of the fits: what is lost by that.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Sequence

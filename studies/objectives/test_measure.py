@@ -1,7 +1,5 @@
 """Spectra of a solid coarsened by every objective, and the materials they are judged on."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tell where the time to a spectrum goes, and how near each phase is to what the machine can do."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

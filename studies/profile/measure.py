@@ -5,8 +5,6 @@ blocks that it found: the factorisation, the block Lanczos iteration with its so
 the Ritz vectors and the verification.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Callable, Iterator

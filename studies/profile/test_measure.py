@@ -1,7 +1,5 @@
 """The profile of a solve: its phases, their work, and what is left of the whole."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ They are those of two packages of Debian and Ubuntu, 160 MB to be loaded, which 
 installed. What is there already stays.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

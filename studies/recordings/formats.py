@@ -1,7 +1,5 @@
 """One recording in other formats of samples, at other rates and with more channels."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from dataclasses import dataclass

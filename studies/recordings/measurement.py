@@ -1,7 +1,5 @@
 """`sound extract` on a clip as people run it: what it writes or says, and its processor time."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -1,7 +1,5 @@
 """Packages of Debian that hold recordings, brought and unpacked without being installed."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

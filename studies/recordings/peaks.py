@@ -1,7 +1,5 @@
 """Peaks of a clip's spectrum that anybody sees, and which of them no mode accounts for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

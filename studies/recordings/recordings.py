@@ -1,7 +1,5 @@
 """The recordings: what was struck, and in which package it lies."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

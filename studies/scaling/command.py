@@ -3,8 +3,6 @@
 It starts the ranks by itself; started on several ranks, it measures these.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

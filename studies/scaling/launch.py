@@ -1,7 +1,5 @@
 """Runs on several numbers of ranks, each started under mpiexec."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

@@ -1,7 +1,5 @@
 """One run on the ranks that there are, phase by phase."""
 
-from __future__ import annotations
-
 import os
 import resource
 import time

@@ -5,8 +5,6 @@
 Operations are counted, see `studies.scaling.work`; the rates are those of the measured runs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Measured and modelled wall times over the number of ranks, on logarithmic axes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Strong and weak scaling of one solid: runs on the ranks asked for, and the model beyond them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Annotated, Any

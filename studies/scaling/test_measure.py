@@ -1,7 +1,5 @@
 """Scaling over ranks: what is counted without running is what runs do, and the model is a model."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from pathlib import Path

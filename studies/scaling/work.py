@@ -6,8 +6,6 @@ s = 3 n^(2/3) unknowns, so that a factorisation takes about 4 s^3 operations and
 2 s^2 entries.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import ceil
 from typing import Any

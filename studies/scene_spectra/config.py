@@ -1,7 +1,5 @@
 """Keys of the study in the configuration."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from annotated_types import Ge, Le

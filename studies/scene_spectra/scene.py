@@ -1,7 +1,5 @@
 """The scene: solids that fall on a floor, and the modes by which they are heard."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

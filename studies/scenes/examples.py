@@ -1,7 +1,5 @@
 """The scenes: which solids are where, of what they are, and how they begin to move."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The examples: which solid, which clips at which places, and in which order they are edited."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field

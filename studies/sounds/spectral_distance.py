@@ -1,7 +1,5 @@
 """How far apart two sounds are: the rms difference of their levels in bands, over time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array

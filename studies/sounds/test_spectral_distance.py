@@ -1,7 +1,5 @@
 """The distance of two sounds in dB: laws that hold for any sounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

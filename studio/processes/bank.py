@@ -1,7 +1,5 @@
 """The bank of a solid: what every point of its surface sounds like, as the page gets it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

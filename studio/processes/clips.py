@@ -1,7 +1,5 @@
 """Modes of clips, and their parts as sounds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A design in other forms, for other tools."""
 
-from __future__ import annotations
-
 from carillon.errors import UserError
 from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import write_wav

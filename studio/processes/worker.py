@@ -1,7 +1,5 @@
 """A process that computes for the studio: asked by name, it answers in order, and may be ended."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys

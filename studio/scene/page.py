@@ -1,7 +1,5 @@
 """Writes the page of a scene: one file that opens in any browser, without server or network."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

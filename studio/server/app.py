@@ -1,7 +1,5 @@
 """The routes: what is answered to which request, see docs/contributing/studio.md."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import quote

@@ -1,7 +1,5 @@
 """Opens the page in the person's browser, without showing its token to others on the machine."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

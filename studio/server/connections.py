@@ -1,7 +1,5 @@
 """Who is connected: few at a time, and who has not been let in goes first."""
 
-from __future__ import annotations
-
 import asyncio
 import resource
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Who may ask: the right Host, Origin and cookie on every request and WebSocket, or nothing."""
 
-from __future__ import annotations
-
 import hmac
 import ipaddress
 import re

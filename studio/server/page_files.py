@@ -1,7 +1,5 @@
 """Files of the page: a table made at the start, from which alone is served."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

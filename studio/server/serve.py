@@ -1,7 +1,5 @@
 """A server that listens until it is told to end."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import signal

@@ -1,7 +1,5 @@
 """The WebSocket: events to the page, calls from the page and their replies."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import traceback

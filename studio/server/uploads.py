@@ -1,7 +1,5 @@
 """Files that the page sends: read with a limit and a clock, under names that are only names."""
 
-from __future__ import annotations
-
 import asyncio
 import unicodedata
 from collections.abc import AsyncGenerator

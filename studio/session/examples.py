@@ -1,7 +1,5 @@
 """Examples that open with one click: built-in solids, and clips that are synthesised for them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from carillon.builtin_names import BUILTIN_PREFIX

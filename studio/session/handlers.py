@@ -1,7 +1,5 @@
 """What pages may ask the studio to do: a function a call, which checks what it is given."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import make_dataclass, replace

@@ -1,7 +1,5 @@
 """Clips of a workspace: who they are, and what was heard in them."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

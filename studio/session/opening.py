@@ -1,7 +1,5 @@
 """What a studio begins with: a file, a solid, or what it was left with."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path

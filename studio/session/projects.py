@@ -1,7 +1,5 @@
 """Projects of a workspace as documents."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

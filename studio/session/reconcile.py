@@ -1,7 +1,5 @@
 """Brings solid, clips and search to what the document describes, and tells what it sounds like."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from contextlib import suppress

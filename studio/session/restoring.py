@@ -1,7 +1,5 @@
 """Sessions as they are kept between two runs, and gone on with: nothing in them leads elsewhere."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """The search: its process, what it has told, and how it is stopped."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

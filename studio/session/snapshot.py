@@ -1,7 +1,5 @@
 """The state of a studio as pages are told it, and as it is kept between two runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any

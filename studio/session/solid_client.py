@@ -1,7 +1,5 @@
 """The solid in its process, kept as a document describes it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

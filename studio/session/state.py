@@ -1,7 +1,5 @@
 """What a studio is about: the document, what computes, and who is told of it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The studio as its server sees it: a state, what follows it, and what pages ask of it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Mapping
 from typing import Any

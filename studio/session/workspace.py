@@ -1,7 +1,5 @@
 """The folder that a studio works in: meshes, clips, projects, and what it keeps for itself."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

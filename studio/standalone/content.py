@@ -1,7 +1,5 @@
 """What a page of a design holds of it: surface, material, modes, targets, in few bytes."""
 
-from __future__ import annotations
-
 from pathlib import PurePath
 from typing import Any
 

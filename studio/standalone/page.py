@@ -4,8 +4,6 @@ A module that lies in a page has no address that others could be found from.  So
 what it imports by a number, and the page says where that is; a worklet's modules become one.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 import html

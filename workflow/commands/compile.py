@@ -4,8 +4,6 @@ They are kept beside the source, or where NUMBA_CACHE_DIR says, for the processo
 A second call does nothing, unless a source or the processor has changed since.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """`python -m workflow digest PATH...`: SHA-256 of what result files say, wherever they are from."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Command line of the estimate: `python -m workflow estimate`."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

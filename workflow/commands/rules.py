@@ -1,7 +1,5 @@
 """Print the path of Snakemake's rules, which an installed Carillon has in a folder of its own."""
 
-from __future__ import annotations
-
 import argparse
 
 from workflow import settings

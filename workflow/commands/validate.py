@@ -1,7 +1,5 @@
 """`python -m workflow validate`: the rules of the validation, on one solid that is named."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

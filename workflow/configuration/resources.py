@@ -1,7 +1,5 @@
 """Memory and time that a job of a rule may take; no result depends on them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

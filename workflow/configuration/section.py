@@ -1,7 +1,5 @@
 """Texts and lists that sections of the configuration hold, and checks across sections."""
 
-from __future__ import annotations
-
 import shlex
 import unicodedata
 from collections.abc import Iterable

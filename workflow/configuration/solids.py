@@ -1,7 +1,5 @@
 """The solids of a run, and those that studies have of their own."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY

@@ -1,7 +1,5 @@
 """The whole configuration: the main chain's sections, and those that studies add."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """What jobs take: medians of earlier runs, scaled by one plain law a kind of jobs."""
 
-from __future__ import annotations
-
 import math
 import re
 import shlex

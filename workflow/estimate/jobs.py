@@ -1,7 +1,5 @@
 """The jobs of a configuration, from Snakemake's dry run where nothing is done yet."""
 
-from __future__ import annotations
-
 import copy
 import json
 import shlex

@@ -1,7 +1,5 @@
 """What the jobs of a configuration take: by stage, and in all."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -6,8 +6,6 @@ go on into such a part instead (aggregated finite elements, Badia, Verdugo and M
 integrals over it are added to the neighbour's, of whose polynomials nothing is lost.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array, Flags, Index

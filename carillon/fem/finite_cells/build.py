@@ -1,7 +1,5 @@
 """Finite cells of a surface."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

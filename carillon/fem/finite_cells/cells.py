@@ -1,7 +1,5 @@
 """The mesh of finite cells, and its voxels, which carry the material."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

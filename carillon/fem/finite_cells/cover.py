@@ -1,7 +1,5 @@
 """Parts of the cells of a lattice that the inside of a surface falls into."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

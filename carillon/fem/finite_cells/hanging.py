@@ -8,8 +8,6 @@ cell says. So every cell has 27 nodes, and displacements are continuous (octree 
 Bielak, Ghattas and Kim 2005, with quadratic elements).
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -4,8 +4,6 @@ Inside is where the winding number is not about zero, as for voxels. Of a closed
 crossings tell it; see `carillon.fem.finite_cells.open_surfaces` for others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

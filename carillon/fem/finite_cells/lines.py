@@ -6,8 +6,6 @@ sharp. Across the lines they are so too where walls lie in planes of the axes: s
 edges that the points are spread on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """A solid of finite cells with material."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self

@@ -4,8 +4,6 @@ The winding number is followed from crossing to crossing through the voxels that
 computed where that does not lead to what the next voxel has.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

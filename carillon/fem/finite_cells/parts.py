@@ -5,8 +5,6 @@ along any axis is inside there. So a wall of any thickness and direction takes b
 together, through corners at least, and walls two boxes apart are told from each other.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

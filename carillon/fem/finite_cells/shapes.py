@@ -7,8 +7,6 @@ over any part of the cell by their values at 5x5x5 Gauss points; the weights are
 the points' Lagrange polynomials over that part, which are its moments in another basis.
 """
 
-from __future__ import annotations
-
 from functools import cache, lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Weights of the cells' points: integrals of their Lagrange polynomials over the inside."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

@@ -6,8 +6,6 @@ apart in the coarse one (Nesme, Kry, Jerabkova and Faure 2009; virtual nodes of 
 Fedkiw 2004). Some blocks may be divided: their cells stay elements, of half the edge.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

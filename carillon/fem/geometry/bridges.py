@@ -6,8 +6,6 @@ face, no points inside the surface are beside each other across it, and none lea
 the other near it. Gaps narrower than about 0.6 voxels may lie between two such points unseen.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

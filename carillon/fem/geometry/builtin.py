@@ -7,8 +7,6 @@ else of them, or refuse. Trial solids have joints and gaps of about a twenty-fou
 side, one voxel at resolution 24; they took no part in any choice of constants.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Voxels and finite cells that both have a share in would join them, stiffly, wher
 happens to lie.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where lines along an axis cross a surface."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Which cells of a hexahedral mesh share a face, and which faces are open."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

@@ -8,8 +8,6 @@ break thin ears and handles off. ``winding``, the default, therefore keeps the v
 least half full and, of the others, those without which the solid would lose a piece or a handle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -6,8 +6,6 @@ Legal, but not read as what they say: positions in integers, normalised or not
 camera's node. What takes an extension that is not known here is refused (Khronos: glTF 2.0, 3.12).
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

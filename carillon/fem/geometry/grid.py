@@ -1,7 +1,5 @@
 """Cubes that a solid is put on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ These are corners of the block all, since the middle of a face hangs only togeth
 of its edges. So every element has eight nodes (octree meshes, as of Bielak, Ghattas and Kim 2005).
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hexahedral mesh of the filled voxels: uniform, or with elements of two sizes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

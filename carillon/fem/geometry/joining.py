@@ -1,7 +1,5 @@
 """Which corners of coarse elements are one node, and the mesh that follows."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -4,8 +4,6 @@ A face that is turned against its neighbours, or a part that is inside out, take
 winding number what it should add: the solid gets holes and hollows that nobody sees.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array, Flags, Index

@@ -4,8 +4,6 @@ Around such an edge of the mesh, solid and void alternate more than once. Voxels
 that both sides have a share in join them there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Array, Index

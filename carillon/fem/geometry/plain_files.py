@@ -6,8 +6,6 @@ keyword; in OFF, faces of different numbers of corners. Of STL and PLY less is r
 or they hold less than they say.
 """
 
-from __future__ import annotations
-
 import codecs
 import re
 

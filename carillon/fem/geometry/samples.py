@@ -5,8 +5,6 @@ numbers do. These are asked about points on lines that leave the solid by a hole
 and wherever the lines along the three axes do not agree.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

@@ -1,7 +1,5 @@
 """How large a mesh and its voxels are, in words, and whether its unit looks wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from carillon.command_line.logs import warn_once

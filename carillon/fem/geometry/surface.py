@@ -1,7 +1,5 @@
 """Surfaces of struck objects: read from a mesh file or made by code."""
 
-from __future__ import annotations
-
 import codecs
 import logging
 import warnings

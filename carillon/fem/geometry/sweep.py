@@ -1,7 +1,5 @@
 """Closed surfaces by turning a profile about z and by sweeping a section along a curve."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import cast
 

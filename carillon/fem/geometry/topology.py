@@ -1,7 +1,5 @@
 """Digital topology of voxel sets: solid connected through faces, void through faces and corners."""
 
-from __future__ import annotations
-
 import heapq
 from functools import lru_cache
 from itertools import product

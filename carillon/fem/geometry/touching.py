@@ -1,7 +1,5 @@
 """Which voxels of a grid a surface touches."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

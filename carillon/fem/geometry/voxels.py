@@ -1,7 +1,5 @@
 """Solid voxel models of surfaces."""
 
-from __future__ import annotations
-
 import operator
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 Jacobson et al. 2013; by the hierarchy of Barill et al. 2018.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from carillon.arrays import Surface

@@ -8,8 +8,6 @@ The engine records no contacts of a sleeping body, so the contacts of the last m
 taken for it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

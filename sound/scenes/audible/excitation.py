@@ -1,7 +1,5 @@
 """Excitation of a body's modes by contacts: impacts, sustained forces and added damping."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

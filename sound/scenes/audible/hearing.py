@@ -6,8 +6,6 @@ of one pole and one zero, and a longer way around the head.  Delays that change 
 shift.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

@@ -12,8 +12,6 @@ has the derivative -i exp(ix) (x^2 + 2 i x - 2) / x^3, and with s = -i omega and
 the pressure rho c v / (k r |h_1'(ka)|) of a sphere that moves at v = A / s becomes the one above.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -16,8 +16,6 @@ the plane wave itself.  This is exact for spheres whose velocity has orders up t
 volume that any solid displaces at low frequencies.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

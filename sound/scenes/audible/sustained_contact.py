@@ -5,8 +5,6 @@ random waves, whose heights fall with the wavelength as those of a self-affine s
 Surface Science Reports 61, 2006).  Waves shorter than the patch of contact are left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

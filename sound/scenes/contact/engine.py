@@ -1,7 +1,5 @@
 """Motion of rigid bodies under gravity by MuJoCo, and the forces at their contacts."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from functools import cache

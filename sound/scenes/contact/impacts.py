@@ -6,8 +6,6 @@ a morphological opening, makes one impact for each of its peaks; Hertz's theory 
 impact sounds.  The rest of the force is sustained contact: resting, rolling and sliding.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

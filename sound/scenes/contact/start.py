@@ -5,8 +5,6 @@ speed of pi d / T, where T is the duration of a bounce: a millimetre makes a bow
 itself.  Depths are those of the convex parts, which may stand out of the visible surface.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

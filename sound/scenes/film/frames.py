@@ -1,7 +1,5 @@
 """Ray-traced frames of a scene: solids on tiles under the sun and the sky."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plays a scene: bodies move, contacts excite their modes, two ears hear them."""
 
-from __future__ import annotations
-
 import time
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """The sound of all bodies of a scene at the ears of its listener."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

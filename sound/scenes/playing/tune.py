@@ -1,7 +1,5 @@
 """A tune: a ball bounces down a row of bars, one for each note."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
