@@ -101,7 +101,7 @@ def check_files(config: Mapping[str, Any]) -> None:
     forests = forests_file(config)
     if forests is not None and not Path(forests).is_file():
         raise UserError(
-            f"forests.model: there is no file {forests}; name one that python -m forests train "
+            f"forests.model: there is no file {forests}; name one that carillon train "
             f"wrote, {DEFAULT_FORESTS} for those of the package, or null to train some"
         )
 

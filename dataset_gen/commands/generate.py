@@ -1,7 +1,7 @@
 """Draw random blocks, fit a coarse element to each, and write them to one shard.
 
 A shard that was begun goes on where it stopped.  Its bytes do not depend on the number of workers,
-of MPI ranks, or of interruptions: mpiexec -n RANKS python -m mpi4py -m dataset_gen generate ...
+of MPI ranks, or of interruptions: mpiexec -n RANKS python -m mpi4py -m carillon generate ...
 """
 
 import argparse

@@ -4,7 +4,7 @@
 unit modulus and the same void pattern p, O the moduli of `oversampled`, G those of the Galerkin
 projection, E_free(1_p) those of `inertial` (of `oversampled` where no cell is void). The factors
 c_p, the exponent s and the share of lumped mass that goes with them are constants, chosen once so
-that the spectra of many random solids come out right; see `python -m solver calibrate`.
+that the spectra of many random solids come out right.
 
 The energies of a lone block cannot tell how its neighbours hold it, nor how much too stiff the
 coarse mesh is between its nodes; a spectrum can. A product of powers with exponents that sum to one

@@ -1,6 +1,6 @@
 """Train both forests on shards of training data, and write them to a file.
 
-On several ranks the forests are the same: mpiexec -n RANKS python -m mpi4py -m forests train ...
+On several ranks the forests are the same: mpiexec -n RANKS python -m mpi4py -m carillon train ...
 """
 
 import argparse

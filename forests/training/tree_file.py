@@ -63,7 +63,7 @@ def load_trees(
     if missing := sorted(numbers - set(trees)):
         raise UserError(
             f"tree {missing[0]} is missing, {len(trees)} of {len(numbers)} trees are named; grow "
-            f"it with python -m forests grow --tree {missing[0]}"
+            f"it with carillon grow --tree {missing[0]}"
         )
     return trees, seconds
 

@@ -83,8 +83,8 @@ def _mismatch(path: str | Path | None, trained: float, expected: float) -> str:
     if path is None:
         return (
             f"the default forests are for Poisson's ratio {trained:g}, the model has {expected:g}; "
-            f"train others (python -m dataset_gen generate --poisson {expected:g}, then python -m "
-            "forests train) and name them with --forest"
+            f"train others (carillon generate --poisson {expected:g}, then carillon train) "
+            "and name them with --forest"
         )
     return (
         f"{path}: trained for Poisson's ratio {trained:g}, the model has {expected:g}; train "

@@ -1,7 +1,7 @@
 """Compute the lowest modes of a solid and write them to a file.
 
 It may be started on several ranks, with the same result:
-mpiexec -n RANKS python -m mpi4py -m solver modes ...
+mpiexec -n RANKS python -m mpi4py -m carillon modes ...
 """
 
 import argparse

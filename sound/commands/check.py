@@ -1,4 +1,4 @@
-"""`python -m sound check`: frequencies of a design on the fine solid, beside its targets.
+"""`carillon check`: frequencies of a design on the fine solid, beside its targets.
 
 The search of `design` works on a coarse solid.  Here the modes of its material are computed on all
 voxels, and the frequencies of both solids are compared with the targets.

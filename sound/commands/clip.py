@@ -1,4 +1,4 @@
-"""`python -m sound clip`: a synthesised clip to design after."""
+"""`carillon clip`: a synthesised clip to design after."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""`python -m sound design`: a material for a project."""
+"""`carillon design`: a material for a project."""
 
 from __future__ import annotations
 

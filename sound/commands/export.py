@@ -1,4 +1,4 @@
-"""`python -m sound export`: a design for other tools."""
+"""`carillon export`: a design for other tools."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ExportOptions:
     out: str = option(
         REQUIRED,
         "file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, .dsp (Faust), or .npy "
-        "(Young's moduli [Pa] of the fine cells, for solver modes --material)",
+        "(Young's moduli [Pa] of the fine cells, for carillon modes --material)",
     )
     format: Annotated[str, OneOf(*FORMATS)] | None = option(None, "where --out has another ending")
     points: Annotated[int, between(0, MOST_POINTS)] = option(

@@ -1,4 +1,4 @@
-"""`python -m sound extract`: the modes of sound clips."""
+"""`carillon extract`: the modes of sound clips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`python -m sound init`: a project file to begin with."""
+"""`carillon init`: a project file to begin with."""
 
 import argparse
 import os

@@ -1,4 +1,4 @@
-"""`python -m sound reach`: which of the targets that a design misses its solid can meet.
+"""`carillon reach`: which of the targets that a design misses its solid can meet.
 
 For every mode that misses its target: whether a material meets it, alone and together with its
 neighbours, or else how near one gets.  All frequencies are of the fine solid and relative to the

@@ -1,4 +1,4 @@
-"""`python -m sound render`: the sound of a strike, or of many, as WAV."""
+"""`carillon render`: the sound of a strike, or of many, as WAV."""
 
 from __future__ import annotations
 

@@ -232,7 +232,7 @@ class SoundEntry:
     radiation: bool = option(
         True,
         "whether modes and the motion of the whole body are heard as they move the air; without, "
-        "modes are as loud as they are struck, as by sound render",
+        "modes are as loud as they are struck, as by carillon render",
     )
     space: bool = option(
         True,

@@ -1,4 +1,4 @@
-"""Command line of the comparison: `python -m workflow compare BASELINE RESULTS`."""
+"""`carillon study compare-runs BASELINE RESULTS`: two runs side by side."""
 
 import argparse
 import json

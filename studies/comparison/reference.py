@@ -36,7 +36,7 @@ DESCRIPTION = f"""\
 Tables of a complete run, made by `snakemake reference`, to set others beside them:
 
     snakemake --profile workflow/profiles/default compare --config baseline={{place}}
-    python -m workflow compare {{place}} RESULTS
+    carillon study compare-runs {{place}} RESULTS
 
 Numbers have {DIGITS} digits; tables of {LONG} rows and more are there as CSV alone.
 

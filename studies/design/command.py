@@ -1,4 +1,4 @@
-"""`python -m sound benchmark`: times of an evaluation, optimisers side by side."""
+"""`carillon study benchmark-design`: times of an evaluation, optimisers side by side."""
 
 import argparse
 import json

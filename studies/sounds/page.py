@@ -194,11 +194,11 @@ def _elsewhere(results: SoundResults) -> Mark:
 
 def _files(results: SoundResults) -> Iterator[tuple[Markup, Markup]]:
     descriptions = {
-        PROJECT: "the project, for python -m sound design",
+        PROJECT: "the project, for carillon design",
         DESIGN: "the design: material, modes, targets, history",
         START: "the same with the uniform material that the search began with",
         TRUTH: "modes of the fine model with the material found",
-        "young.npy": "Young’s modulus [Pa] of every voxel, for solver modes --material",
+        "young.npy": "Young’s modulus [Pa] of every voxel, for carillon modes --material",
         "optimisers.json": "the optimisers beside each other",
         REACHED: "which modes the solid can have",
     }

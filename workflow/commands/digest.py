@@ -1,4 +1,4 @@
-"""`python -m workflow digest PATH...`: SHA-256 of what result files say, wherever they are from."""
+"""`carillon digest PATH...`: SHA-256 of what result files say, wherever they are from."""
 
 import argparse
 import hashlib

@@ -1,4 +1,4 @@
-"""Command line of the estimate: `python -m workflow estimate`."""
+"""Command line of the estimate: `carillon estimate`."""
 
 import argparse
 import json

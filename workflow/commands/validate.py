@@ -1,4 +1,4 @@
-"""`python -m workflow validate`: the rules of the validation, on one solid that is named."""
+"""`carillon validate`: the rules of the validation, on one solid that is named."""
 
 import argparse
 import re
