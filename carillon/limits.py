@@ -24,6 +24,8 @@ DENSITIES = (1e-3, 1e6)
 """Mass density [kg/m^3]."""
 RESOLUTIONS = (2, 100_000)
 """Voxels, or lattice spacings, along the longest side of a solid."""
+FEWEST_MODES = 7
+"""Modes that are computed of a solid, of which the first six are rigid motions."""
 POISSON = (-1.0, 0.5)
 """Poisson's ratio, both ends excluded."""
 

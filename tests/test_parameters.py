@@ -10,13 +10,27 @@ from annotated_types import Ge, Le
 
 from carillon.command_line.arguments import Parser
 from carillon.errors import UserError
-from carillon.parameters import REQUIRED, Check, OneOf, option, parameters
-from carillon.parameters.command_line import add_options, collect
+from carillon.parameters import REQUIRED, Check, OneOf, option, parameters, quantities
+from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.documents import parameters_from, read_parameters
-from carillon.parameters.fields import parameters_of
-from carillon.parameters.quantities import Density, PoissonRatio, Resolution
+from carillon.parameters.fields import domain_of, parameters_of
+from carillon.parameters.quantities import (
+    Corrections,
+    Density,
+    NumberOfModes,
+    PoissonRatio,
+    Resolution,
+    ToleranceOrNone,
+    Workers,
+    WorkersAnywhere,
+)
 from carillon.parameters.sentences import ParameterError
+from solver.analysis.options import SolverOptions
+from sound.project.settings import OptimiserSettings
 from workflow.commands.validate import ValidateOptions
+from workflow.configuration.forests import DatasetSection
+from workflow.configuration.run import MadeCorrections, ProvedTolerance, SolverSection
+from workflow.configuration.solids import ModelEntry, ModelModes
 
 Vector = Annotated[tuple[float, float, float], "a position [m]"]
 
@@ -80,8 +94,8 @@ def test_construction_converts_numbers_of_numpy_and_lists():
         ({"resolution": 10**6}, "resolution: found 1000000, expected at most 100,000: voxels"),
         ({"resolution": 8.5}, "resolution: found 8.5, expected a whole number: voxels"),
         ({"resolution": "8"}, "resolution: found '8', expected a whole number: voxels"),
-        ({"resolution": True}, "resolution: found True, expected a whole number: voxels"),
-        ({"resolution": None}, "resolution: found None, expected a whole number: voxels"),
+        ({"resolution": True}, "resolution: found true, expected a whole number: voxels"),
+        ({"resolution": None}, "resolution: found nothing, expected a whole number: voxels"),
         ({"resoluton": 8}, "there is no key 'resoluton', only resolution, density, poisson, modes"),
         ({"density": 0}, "density: found 0, expected at least 0.001 kg/m^3: mass density [kg/m^3]"),
         ({"density": float("nan")}, "density: found nan, expected a finite number: mass density"),
@@ -92,6 +106,8 @@ def test_construction_converts_numbers_of_numpy_and_lists():
         ({"modes": "aut"}, "expected a whole number or auto (did you mean auto?): number of"),
         ({"method": "fats"}, "found 'fats', expected one of fast, slow (did you mean fast?): how"),
         ({"lumped": 1}, "lumped: found 1, expected true or false: lump the mass"),
+        ({"lumped": None}, "lumped: found nothing, expected true or false: lump the mass"),
+        ({"method": False}, "found false, as YAML reads no and off without quotes, expected one"),
         ({"points": 3}, "points: found 3, expected a list: points of the solid"),
         ({"points": [{"at": None}]}, "points[0]: the key name is missing, expected name of the"),
         ({"points": [{"name": "a", "at": [1, 2]}]}, "points[0].at: found [1, 2], expected 3 of"),
@@ -155,6 +171,48 @@ def test_a_mistake_on_a_command_line_names_the_option(words, sentence):
     with pytest.raises(UserError) as error:
         _parsed(*words.split())
     assert sentence in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("annotation", "word", "sentence"),
+    [
+        (Workers, "1025", "found 1025, expected at most 1,024"),
+        (Workers, "65", "found 65, expected at most 64, since 2 cores are usable here"),
+        (NumberOfModes, "6", "found 6, expected at least 7, since the first 6 are rigid motions"),
+        (ModelModes, "7", "found 7, expected at least 12, since pages compare half a dozen"),
+        (ToleranceOrNone, "1e-16", "found 1e-16, expected 1e-15 to 1, or 0 for no tolerance"),
+        (ProvedTolerance, "0", "found 0, expected at least 1e-15, since the validation proves"),
+        (ProvedTolerance, "0.5", "found 0.5, expected at most 0.1, since the validation proves"),
+        (MadeCorrections, "0", "found 0, expected at least 1, since plain HCMS is"),
+    ],
+)
+def test_limits_of_a_shared_quantity_are_told_with_their_reason(
+    monkeypatch, annotation, word, sentence
+):
+    monkeypatch.setattr(quantities, "allowed_cores", lambda: 2)
+    with pytest.raises(argparse.ArgumentTypeError) as error:
+        reader(annotation)(word)
+    assert sentence in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "annotation"),
+    [
+        (DatasetSection, "workers", WorkersAnywhere),
+        (OptimiserSettings, "workers", WorkersAnywhere),
+        (SolverOptions, "tolerance", ToleranceOrNone),
+        (SolverSection, "tolerance", ProvedTolerance),
+        (ValidateOptions, "tolerance", ProvedTolerance),
+        (SolverOptions, "corrections", Corrections),
+        (SolverSection, "corrections", MadeCorrections),
+        (SolverOptions, "modes", NumberOfModes),
+        (SolverSection, "modes", ModelModes),
+        (ModelEntry, "modes", ModelModes),
+        (ValidateOptions, "modes", ModelModes),
+    ],
+)
+def test_a_quantity_has_the_same_limits_wherever_it_is_given(model, name, annotation):
+    assert parameters_of(model)[name].domain.limits == domain_of(annotation).limits
 
 
 def test_help_shows_meanings_and_defaults():

@@ -166,7 +166,7 @@ def test_material_array_of_the_right_length_is_used(tmp_path, run_cli, n_voxels)
         (["builtin:bar", "--resolution", "1"], "--resolution: found 1, expected at least 2"),
         ([*BAR, "--material", "steel"], "material 'steel'"),
         ([*BAR, "--modes", "100000"], "100,000 modes asked for"),
-        ([*BAR, "--modes", "6"], "6 modes asked for"),
+        ([*BAR, "--modes", "6"], "--modes: found 6, expected at least 7, since"),
         (
             [*BAR, *"--modes 30 --retained-modes 30".split()],
             "--retained-modes 30 is too few for 30",

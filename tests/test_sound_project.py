@@ -166,9 +166,9 @@ RIM = LEAST["targets"][0]
         ({"modes": 1}, "modes: found 1, expected at least 2, or auto: elastic modes"),
         ({"modes": "many"}, "modes: found 'many', expected a whole number or auto: elastic modes"),
         ({"modes": "auto\n"}, "modes: found 'auto.n', expected a whole number or auto"),
-        ({"modes": None}, "modes: found None, expected a whole number or auto: elastic modes"),
+        ({"modes": None}, "modes: found nothing, expected a whole number or auto: elastic modes"),
         ({"modes": 2.5}, "modes: found 2.5, expected a whole number or auto: elastic modes"),
-        ({"mesh": None}, "mesh: found None, expected a text"),
+        ({"mesh": None}, "mesh: found nothing, expected a text"),
         (
             {"coarsen": "fit"},
             "coarsen: found 'fit', expected one of auto, none, average, galerkin, ddfem",
@@ -176,7 +176,7 @@ RIM = LEAST["targets"][0]
         ({"poisson": 0.5}, "poisson: found 0.5, expected below 0.5"),
         ({"density": float("nan")}, "density: found nan, expected a finite number"),
         ({"density": 1e300}, "density: found 1e.300, expected at most 1e.06"),
-        ({"density": True}, "density: found True, expected a number"),
+        ({"density": True}, "density: found true, expected a number"),
         ({"density": 10**400}, "density: found 1000"),
         ({"modes": 10**12}, "modes: found 1000000000000, expected at most 10,000, or auto"),
         ({"resolution": 10**9}, "resolution: found 1000000000, expected at most 100,000"),
@@ -211,7 +211,7 @@ RIM = LEAST["targets"][0]
             r"targets\[0\].at\[0\]: .*expected",
         ),
         ({"optimiser": {"seconds": 0}}, "optimiser.seconds: found 0, expected above 0"),
-        ({"optimiser": None}, "optimiser: found None, expected keys and values"),
+        ({"optimiser": None}, "optimiser: found nothing, expected keys and values"),
     ],
 )
 def test_a_mistake_is_answered_in_one_sentence(folder, keys, says):

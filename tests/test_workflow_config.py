@@ -184,7 +184,7 @@ LISTS = {
     "acceleration": "solver.correction.criteria:ACCELERATIONS",
     "linear_solver": "solver.linear:METHODS",
     "missed_tolerance": "solver.analysis.options:MISSED",
-    "rivals": "studies.benchmark.further:RIVALS",
+    "rivals": "studies.benchmark.further_rivals:RIVALS",
     "quantity": "studies.objectives.goals:LABELS",
     "solids": "studies.accuracy.solids:SOLIDS",
 }

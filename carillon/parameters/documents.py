@@ -53,7 +53,7 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
     try:
         made: T = adapter(model).validate_json(text, strict=True)  # type: ignore[arg-type]
     except ValidationError as error:
-        raise mistake_of(error, ValueDomain(model)) from None
+        raise mistake_of(error, ValueDomain(model), in_yaml=True) from None
     return made
 
 
@@ -73,7 +73,7 @@ def require_values(document: Mapping[str, Any], model: type, leave_out: Sequence
         try:
             adapter(known[name].annotation).validate_json(text, strict=True)
         except ValidationError as error:
-            mistake = mistake_of(error, known[name].domain)
+            mistake = mistake_of(error, known[name].domain, in_yaml=True)
             raise ParameterError((name, *mistake.place), mistake.reason, mistake.meaning) from None
 
 

@@ -25,6 +25,8 @@ class ValueDomain:
     """What they are, with the unit in brackets; empty if the annotation does not say."""
     limits: Mapping[str, float] = field(default_factory=dict)
     """By the names of `annotated_types`: ge, gt, le, lt, min_length, max_length."""
+    why: str = ""
+    """Reason for the limits, where there is one to tell."""
     choices: tuple[str, ...] = ()
     """Texts that are admitted, if not all are."""
     words: tuple[str, ...] = ()
@@ -154,4 +156,5 @@ def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
         else:
             known = {name: getattr(mark, name, None) for name in _LIMITS}
             limits |= {name: value for name, value in known.items() if value is not None}
+            domain = replace(domain, why=getattr(mark, "why", "") or domain.why)
     return replace(domain, limits=limits)

@@ -38,15 +38,18 @@ class OneOf:
 class Within:
     """Marker of limits: ge, gt, le and lt of numbers, min_length and max_length of texts and lists.
 
-    Those of `annotated_types` mean the same; to import these takes as long as `--help`.
+    `why` is the reason for them, where it does not go without saying. Those of `annotated_types`
+    mean the same; to import these takes as long as `--help`.
     """
 
-    def __init__(self, **limits: float) -> None:
+    def __init__(self, why: str = "", **limits: float) -> None:
+        self.why = why
+        self.limits = limits
         for name, value in limits.items():
             setattr(self, name, value)
 
     def __get_pydantic_core_schema__(self, source: Any, admit: GetCoreSchemaHandler) -> CoreSchema:
-        schema: Any = {**admit(source), **vars(self)}
+        schema: Any = {**admit(source), **self.limits}
         return schema  # type: ignore[no-any-return]
 
 

@@ -2,8 +2,8 @@
 
 from typing import Annotated, TypeVar
 
-from carillon.limits import DENSITIES, MODULI, POISSON, RESOLUTIONS, UNITS
-from carillon.parameters.model import OneOf, Within
+from carillon.limits import DENSITIES, FEWEST_MODES, MODULI, POISSON, RESOLUTIONS, UNITS
+from carillon.parameters.model import Check, OneOf, Within
 from carillon.processes.threads import allowed_cores
 
 T = TypeVar("T")
@@ -13,7 +13,12 @@ LARGEST = 2**63 - 1
 MOST_UNKNOWNS = 2**31 - 1
 """Largest number of unknowns of a model, and so of its modes."""
 
-MOST_WORKERS = 64
+LEAST_TOLERANCE = 1e-15
+"""Smallest relative tolerance that double precision can reach."""
+
+MOST_WORKERS = 1024
+"""Processes or threads that a file may ask of the machine that it is meant for."""
+WORKERS_OF_MACHINE = 64
 """Processes or threads that one command may start on a machine of few cores."""
 WORKERS_OF_CORE = 4
 """Processes or threads that one command may start for each core of a machine with more."""
@@ -22,6 +27,24 @@ WORKERS_OF_CORE = 4
 def between(low: float, high: float) -> Within:
     """Mark of numbers within limits, both of them included."""
     return Within(ge=low, le=high)
+
+
+def _bearable(workers: int) -> int:
+    cores = allowed_cores()
+    most = max(WORKERS_OF_MACHINE, WORKERS_OF_CORE * cores)
+    if workers > most:
+        raise ValueError(
+            f"found {workers:,}, expected at most {most:,}, since {cores:,} cores are usable here"
+        )
+    return workers
+
+
+def _reachable(tolerance: float) -> float:
+    if 0.0 < tolerance < LEAST_TOLERANCE:
+        raise ValueError(
+            f"found {tolerance:g}, expected {LEAST_TOLERANCE:g} to 1, or 0 for no tolerance"
+        )
+    return tolerance
 
 
 Pair = tuple[T, T]
@@ -34,7 +57,9 @@ Count = Annotated[int, between(1, LARGEST)]
 """A number of things, one at least."""
 Number = Annotated[int, between(0, LARGEST)]
 """A number of things or of one of them, counted from 0."""
-Workers = Annotated[int, between(1, max(MOST_WORKERS, WORKERS_OF_CORE * allowed_cores()))]
+WorkersAnywhere = Annotated[int, between(1, MOST_WORKERS)]
+"""A number of processes or threads, on whatever machine."""
+Workers = Annotated[WorkersAnywhere, Check(_bearable)]
 """A number of processes or threads, no more than this machine could bear."""
 Positive = Annotated[float, Within(gt=0.0)]
 NonNegative = Annotated[float, Within(ge=0.0)]
@@ -60,7 +85,16 @@ Components = Annotated[
 Density = Annotated[float, between(*DENSITIES), "mass density [kg/m^3]"]
 PoissonRatio = Annotated[float, Within(gt=POISSON[0], lt=POISSON[1]), "Poisson's ratio [1]"]
 YoungsModulus = Annotated[float, between(*MODULI), "Young's modulus [Pa]"]
-Tolerance = Annotated[float, between(1e-15, 1.0), "relative error that double precision can reach"]
-NumberOfModes = Annotated[
-    int, between(1, MOST_UNKNOWNS), "number of modes, rigid ones included [1]"
+Tolerance = Annotated[
+    float, between(LEAST_TOLERANCE, 1.0), "relative error that double precision can reach"
 ]
+ToleranceOrNone = Annotated[float, between(0.0, 1.0), Check(_reachable)]
+"""The same, or 0 for none."""
+Corrections = Annotated[int, between(0, 10_000)]
+"""A number of steps of error correction."""
+NumberOfModes = Annotated[
+    int,
+    Within(f"the first {FEWEST_MODES - 1} are rigid motions", ge=FEWEST_MODES, le=MOST_UNKNOWNS),
+    "number of modes, rigid ones included [1]",
+]
+NumberOfUnknowns = Annotated[int, between(1, MOST_UNKNOWNS)]

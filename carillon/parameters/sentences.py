@@ -59,30 +59,34 @@ class ParameterError(UserError):
         self.meaning = meaning
 
 
-def mistake_of(error: ValidationError, domain: ValueDomain) -> ParameterError:
+def mistake_of(
+    error: ValidationError, domain: ValueDomain, in_yaml: bool = False
+) -> ParameterError:
     """The first mistake that pydantic found in values that should have a domain.
 
-    A mistyped key often is also one that is missed: the former says more and goes first.
+    A mistyped key often is also one that is missed: the former says more and goes first. What was
+    found is shown in the words of Python or of YAML.
     """
     mistakes = error.errors(include_url=False)
     mistakes.sort(key=lambda mistake: mistake["type"] not in _UNKNOWN)
     mistake = mistakes[0]
     kind, found = mistake["type"], mistake.get("input")
     place, domain, parent = _followed(mistake["loc"], domain)
+    shown = _in_yaml(found, domain) if in_yaml else _shown(found)
     if kind in _UNKNOWN:
         unknown = no_key(str(place[-1]), list(parameters_of(parent.kind)))
         mistyped = ParameterError(place[:-1], unknown)
         mistyped.place = place  # Of the line, which names the key.
         return mistyped
     if kind == "missing" and parent.kind is tuple:
-        reason = f"found {_shown(found)}, expected {len(parent.items)} of them"
+        reason = f"found {shown}, expected {len(parent.items)} of them"
         return ParameterError(place[:-1], reason, parent.meaning)
     if kind == "missing":
         reason = f"the key {place[-1]} is missing, expected {domain.meaning}"
         return ParameterError(place[:-1], reason)
     if kind in ("value_error", "assertion_error"):
         return ParameterError(place, str(mistake["ctx"]["error"]))
-    reason = f"found {_shown(found)}, expected {_expected(kind, mistake.get('ctx', {}), domain)}"
+    reason = f"found {shown}, expected {_expected(kind, mistake.get('ctx', {}), domain)}"
     suggestion = alike(found, [*domain.choices, *domain.words]) if isinstance(found, str) else None
     if suggestion:
         reason += f" (did you mean {suggestion}?)"
@@ -141,7 +145,8 @@ def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
         )
         if "than" in kind and domain.unit:
             bound += f" {domain.unit}"
-        return f"{bound}, or {' or '.join(domain.words)}" if domain.words else bound
+        bound += f", or {' or '.join(domain.words)}" if domain.words else ""
+        return f"{bound}, since {domain.why}" if domain.why and "than" in kind else bound
     if domain.choices:
         return f"one of {', '.join(domain.choices)}"
     named = [_KINDS.get(domain.kind, "keys and values"), *domain.words, *["null"] * domain.nullable]
@@ -169,3 +174,12 @@ def alike(word: str, words: Iterable[str]) -> str | None:
     lower = {each.lower(): each for each in words}
     found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
     return lower[found[0]] if found else None
+
+
+def _in_yaml(value: Any, domain: ValueDomain) -> str:
+    if value is None:
+        return "nothing"
+    if not isinstance(value, bool):
+        return _shown(value)
+    words = "true, as YAML reads yes and on" if value else "false, as YAML reads no and off"
+    return f"{words} without quotes" if domain.kind is str else words.partition(",")[0]

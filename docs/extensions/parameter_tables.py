@@ -21,7 +21,8 @@ def sections(model: type, plain_title: str) -> str:
     parts = [f"## {plain_title}", *_entries(plain, "")]
     for each in known:
         if nested := _nested(each.domain):
-            parts += [f"## {each.name}", f"{_meaning(each)}."]
+            required = " Required." if each.default is REQUIRED else ""
+            parts += [f"## {each.name}", f"{_meaning(each)}.{required}"]
             parts += _entries(parameters_of(nested).values(), f"{_named(each)}.")
     return "\n\n".join(parts) + "\n"
 
@@ -67,7 +68,8 @@ def _type(domain: ValueDomain) -> str:
     known = _LENGTHS if domain.kind in (tuple, dict) else _BOUNDS
     limits = domain.limits
     bounds = [known[name].format(_number(limits[name])) for name in known if name in limits]
-    return ", ".join([kind, *bounds])
+    why = f", since {domain.why}" if domain.why else ""
+    return ", ".join([kind, *bounds]) + why
 
 
 def _number(value: float) -> str:

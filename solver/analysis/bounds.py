@@ -5,7 +5,7 @@ from typing import cast
 from mpi4py import MPI
 
 from carillon.errors import UserError, on_all_ranks
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from carillon.processes.memory import available_memory
 from solver.analysis.options import SolverOptions
 from solver.correction.criteria import FEWEST_GUARDS, default_guard
@@ -25,12 +25,7 @@ at a time."""
 
 @on_all_ranks()
 def check_mode_count(modes: int, n_dofs: int) -> None:
-    """Raise UserError unless there is an elastic mode among `modes` and unknowns for all."""
-    if modes <= RIGID_MODES:
-        raise UserError(
-            f"{modes} modes asked for; the first {RIGID_MODES} are rigid motions, expected "
-            f"{RIGID_MODES + 1} or more"
-        )
+    """Raise UserError unless there are unknowns for all `modes`."""
     if modes > n_dofs:
         raise UserError(
             f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer or "

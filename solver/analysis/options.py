@@ -6,8 +6,15 @@ from dataclasses import replace
 from typing import Annotated
 
 from carillon.errors import UserError, on_all_ranks
-from carillon.parameters import Check, OneOf, option, parameters
-from carillon.parameters.quantities import Number, NumberOfModes, between
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.quantities import (
+    Corrections,
+    Number,
+    NumberOfModes,
+    NumberOfUnknowns,
+    ToleranceOrNone,
+    between,
+)
 from solver import linear
 from solver.correction.criteria import ACCELERATIONS, EIGENVALUE_TOLERANCE
 from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
@@ -22,22 +29,6 @@ MISSED = ("fail", "keep")
 """Consequences of a correction that misses its tolerance."""
 LEAST_UNKNOWNS = 4
 """Least number of unknowns for each mode at which `auto` starts from random vectors."""
-LEAST_TOLERANCE = 1e-15
-"""Smallest relative tolerance that double precision can reach."""
-
-
-def _reachable(tolerance: float) -> float:
-    if 0.0 < tolerance < LEAST_TOLERANCE:
-        raise ValueError(
-            f"found {tolerance:g}, expected {LEAST_TOLERANCE:g} to 1, or 0 for no tolerance"
-        )
-    return tolerance
-
-
-Steps = Annotated[int, between(0, 10_000)]
-"""A number of steps."""
-ToleranceOrNone = Annotated[float, between(0.0, 1.0), Check(_reachable)]
-"""A relative tolerance that double precision can reach, or 0 for none."""
 
 
 @parameters
@@ -61,10 +52,10 @@ class SolverOptions:
         f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
     )
-    corrections: Steps = option(
+    corrections: Corrections = option(
         MAX_CORRECTIONS, "largest number of correction steps; 0 is plain HCMS"
     )
-    retained_modes: NumberOfModes | None = option(
+    retained_modes: NumberOfUnknowns | None = option(
         None, "modes kept at the root of the merge tree (default: some more than --modes)"
     )
     cutoff: Annotated[float, between(1e-9, 1000000000000000.0)] | None = option(
@@ -73,7 +64,7 @@ class SolverOptions:
         "that grow with the subdomains)",
         metavar="HZ",
     )
-    subdomains: NumberOfModes | None = option(
+    subdomains: NumberOfUnknowns | None = option(
         None, "number of subdomains (default: from the unknowns)"
     )
     interface: Annotated[str, OneOf(*INTERFACES)] = option(

@@ -3,7 +3,14 @@
 from typing import Annotated
 
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
-from carillon.parameters.quantities import File, Pair, Point, YoungsModulus, between
+from carillon.parameters.quantities import (
+    File,
+    Pair,
+    Point,
+    WorkersAnywhere,
+    YoungsModulus,
+    between,
+)
 
 LEAST_WEIGHT = 1e-12
 """Weight of frequencies or of amplitudes below which a search has nothing to lower."""
@@ -141,7 +148,7 @@ class OptimiserSettings:
     population: Annotated[int, between(2, 10_000)] | None = option(
         None, "offspring of a generation; the strategy's choice if null [1]"
     )
-    workers: Annotated[int, between(1, 1024)] | None = option(
+    workers: WorkersAnywhere | None = option(
         None, "processes that evaluate candidates; one per core if null [1]"
     )
     fine_check: bool = option(

@@ -209,7 +209,7 @@ def test_frequency_errors_have_signs():
         (["builtin:bar", "--resolution", "16", "--runs", "0"], "--runs"),
         (["builtin:bar", "--resolution", "16", "--slow-runs", "0"], "--slow-runs"),
         (["builtin:bar", "--resolution", "16", "--modes", "200"], "the coarsened model has"),
-        (["builtin:bar", "--resolution", "16", "--modes", "6"], "6 modes asked for"),
+        (["builtin:bar", "--resolution", "16", "--modes", "6"], "found 6, expected at"),
         (["builtin:bar", "--resolution", "16", "--forest", "absent.h5"], "absent.h5"),
         (["builtin:bar", "--resolution", "16", "--out", "absent/row.json"], "absent"),
     ],

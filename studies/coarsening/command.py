@@ -5,8 +5,6 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
-from annotated_types import Ge
-
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
 from carillon.parameters.command_line import collect, reader
@@ -54,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--timed-modes",
-        type=reader(Annotated[NumberOfModes, Ge(RIGID_MODES + 1)]),
+        type=reader(NumberOfModes),
         help="modes computed where the coarse model is weighed against the fine one and both are "
         "timed (default: --modes)",
     )

@@ -8,6 +8,7 @@ from carillon.parameters import option, parameters
 from workflow.configuration.resources import JobLimits
 from workflow.configuration.solids import (
     Materials,
+    ModelModes,
     Solids,
     StudiedForests,
     StudiedSolid,
@@ -29,7 +30,7 @@ class CoarseningSection:
         default_solids(StudiedSolid, dict.fromkeys(SOLIDS, {"resolutions": [24]}))
     )
     materials: Materials = option(("uniform", "noise"))
-    modes: Annotated[int, Ge(12), Le(60)] = option(
+    modes: Annotated[ModelModes, Le(60)] = option(
         60, "number of the last mode rated; the first is 7 [1]"
     )
     refine_to: Annotated[float, Ge(0.001), Le(10)] = option(

@@ -3,9 +3,8 @@
 import argparse
 
 from carillon.parameters.command_line import collect, reader
-from carillon.parameters.quantities import NumberOfModes
+from carillon.parameters.quantities import Corrections, NumberOfModes
 from carillon.records.measurement import measured
-from solver.analysis.options import Steps
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
 from solver.distribution.collective import compute_on_root
@@ -22,7 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--modes", type=reader(NumberOfModes), default=256, help="rigid included (default 256)"
     )
-    parser.add_argument("--steps", type=reader(Steps), default=3, help="corrections (default 3)")
+    parser.add_argument(
+        "--steps", type=reader(Corrections), default=3, help="corrections (default 3)"
+    )
     parser.add_argument(
         "--truth", help="modes file with the exact eigenvalues (default: SLEPc finds them)"
     )

@@ -2,13 +2,14 @@
 
 from typing import Annotated
 
-from annotated_types import Ge, Le
+from annotated_types import Le
 
 from carillon.parameters import option, parameters
 from workflow.configuration.resources import JobLimits
 from workflow.configuration.section import Runs
 from workflow.configuration.solids import (
     Materials,
+    ModelModes,
     Solids,
     StudiedForests,
     StudiedSolid,
@@ -29,7 +30,7 @@ class DiscretisationSection:
         default_solids(StudiedSolid, dict.fromkeys(SOLIDS, {"resolutions": [20]}))
     )
     materials: Materials = option(("uniform", "smooth", "two-region", "noise"))
-    modes: Annotated[int, Ge(12), Le(1000)] = option(
+    modes: Annotated[ModelModes, Le(1000)] = option(
         36, "number of the last mode rated; the first is 7 [1]"
     )
     runs: Runs = option(3, "rounds in which every way to the spectrum is timed once [1]")

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import yaml
-from annotated_types import Ge
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.command_line.progress import say
@@ -26,7 +25,8 @@ from solver.coarsening.forest import load_forest
 from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.response.surface import surface_of
 from studies.base.table import read_table
-from workflow.configuration.run import TolerancesSection
+from workflow.configuration.run import ProvedTolerance, TolerancesSection
+from workflow.configuration.solids import ModelModes
 from workflow.configuration.whole import completed
 from workflow.disk_space import make_folder, require_own
 from workflow.report.findings import headline
@@ -64,14 +64,14 @@ class ValidateOptions:
 
     out: str = option(REQUIRED, "folder of all results", metavar="FOLDER")
     name: str | None = option(None, "name of the solid's page (default: that of the mesh)")
-    modes: Annotated[int, Ge(12)] = option(256, "rigid included")
+    modes: ModelModes = option(256, "rigid included")
     mass_damping: NonNegative | None = option(
         None, "Rayleigh damping [1/s] (default: of a plastic)"
     )
     stiffness_damping: NonNegative | None = option(
         None, "Rayleigh damping [s] (default: of a plastic)"
     )
-    tolerance: Annotated[float, between(1e-15, 0.1)] = option(
+    tolerance: ProvedTolerance = option(
         EIGENVALUE_TOLERANCE,
         "relative error of an eigenvalue that HCMS + EC is corrected to, and from which the limits "
         "of the criteria follow",

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 
 from carillon.errors import UserError
 from carillon.parameters import OneOf, option, parameters
-from carillon.parameters.quantities import Seed
+from carillon.parameters.quantities import Seed, WorkersAnywhere
 from carillon.parameters.sentences import ParameterError
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from dataset_gen.sampling import DISTRIBUTIONS, moduli
@@ -79,8 +79,10 @@ class DatasetSection:
         "fit objective of dataset_gen; sampled-energy is energy by the paper's 5,000 sampled "
         "forces a block, some hundred times slower",
     )
-    workers: Annotated[int, Ge(1), Le(1024)] = option(
-        1, "processes that share the work on one shard [1]"
+    workers: WorkersAnywhere = option(
+        1,
+        "processes that share the work on one shard, no more than the cores that Snakemake may use"
+        " [1]",
     )
 
     def check_in(self, run: Configuration) -> None:

@@ -7,8 +7,14 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le
 
-from carillon.parameters import REQUIRED, option, parameters
-from carillon.parameters.quantities import PoissonRatio, Resolution
+from carillon.parameters import REQUIRED, Within, option, parameters
+from carillon.parameters.quantities import (
+    Corrections,
+    NumberOfUnknowns,
+    PoissonRatio,
+    Resolution,
+    Tolerance,
+)
 from workflow.configuration.forests import DatasetSection, DefaultForestSection, ForestsSection
 from workflow.configuration.resources import LimitsSection
 from workflow.configuration.section import (
@@ -29,7 +35,14 @@ from workflow.configuration.section import (
 from workflow.configuration.solids import ModelEntry, ModelModes, Solids
 
 Names = Distinct[Line]
-Corrections = Annotated[int, Ge(1), Le(10)]
+ProvedTolerance = Annotated[
+    Tolerance,
+    Within("the validation proves that ten times as much is kept", le=0.1),
+    "relative eigenvalue error at which error correction stops [1]",
+]
+MadeCorrections = Annotated[
+    Corrections, Within("plain HCMS is beside them as a method of its own", ge=1)
+]
 Residual = Annotated[float, Gt(0), Le(1.0)]
 
 
@@ -38,14 +51,12 @@ class SolverSection:
     """Modal analysis."""
 
     modes: ModelModes = option(256, "modes of every model, rigid ones included [1]")
-    tolerance: Annotated[float, Gt(0), Le(0.1)] = option(
-        1e-7, "relative eigenvalue error at which error correction stops [1]"
-    )
-    corrections: Annotated[int, Ge(1), Le(1000)] = option(40, "most steps of error correction [1]")
-    retained_modes: Annotated[int, Ge(12), Le(20_000)] | None = option(
+    tolerance: ProvedTolerance = option(1e-7)
+    corrections: MadeCorrections = option(40, "most steps of error correction [1]")
+    retained_modes: Annotated[NumberOfUnknowns, Ge(12)] | None = option(
         None, "modes kept at the root of the merge tree; the solver's choice if null [1]"
     )
-    subdomains: Annotated[int, Ge(1), Le(65_536)] | None = option(
+    subdomains: NumberOfUnknowns | None = option(
         None, "subdomains of HCMS; the solver's choice if null [1]"
     )
     interface: Literal["overlapping", "free", "fixed"] = option(
@@ -177,7 +188,7 @@ class ConvergenceSection(MeasuredSection):
     """How the eigenvalues approach the truth, correction by correction (Fig. 10)."""
 
     modes: ModelModes = option(256, "modes followed, rigid ones included [1]")
-    steps: Corrections = option(3, "corrections made [1]")
+    steps: Annotated[MadeCorrections, Le(10)] = option(3, "corrections made [1]")
 
 
 @parameters

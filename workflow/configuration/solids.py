@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MaxLen, MinLen
 
 from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.fem.materials import NAMES as MATERIALS
-from carillon.parameters import REQUIRED, Check, OneOf, option, parameters
+from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.documents import parameters_from
 from carillon.parameters.quantities import (
     Components,
@@ -17,6 +17,7 @@ from carillon.parameters.quantities import (
     Discretisation,
     Fill,
     MetresPerUnit,
+    NumberOfModes,
     Resolution,
     Seed,
 )
@@ -55,7 +56,11 @@ def _plainly_named(solids: dict[str, Entry]) -> dict[str, Entry]:
 Mesh = Annotated[File, Check(_known), "either builtin:NAME or a file below mesh_folder"]
 Material = Annotated[str, OneOf(*MATERIALS)]
 Materials = Annotated[Several[Material], "named materials that every solid is given"]
-ModelModes = Annotated[int, Ge(12), Le(10_000), "modes computed, rigid ones included [1]"]
+ModelModes = Annotated[
+    NumberOfModes,
+    Within("pages compare half a dozen elastic ones", ge=12),
+    "modes computed, rigid ones included [1]",
+]
 Coordinate = Annotated[float, Ge(-1e12), Le(1e12)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 Solids = Annotated[
@@ -139,6 +144,6 @@ class ModelEntry(SolidEntry):
         "point of the surface whose motion after the strike is compared, in the mesh's own "
         "coordinates; chosen by the ground truth if null [mesh unit]",
     )
-    modes: Annotated[int, Ge(12), Le(10_000)] | None = option(
+    modes: ModelModes | None = option(
         None, "modes of this model, rigid ones included; solver.modes if null [1]"
     )
