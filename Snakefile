@@ -23,8 +23,9 @@ if not workflow.overwrite_configfiles:
 
 
 try:
-    config = settings.complete(workflow.configfiles, workflow.config_settings.config)
-    settings.check_files(config)
+    given = workflow.configfiles, workflow.config_settings.config
+    config = settings.complete(*given)
+    settings.check_files(config, *given)
     rules_of_studies = studies.rules()
 except UserError as error:
     raise WorkflowError(str(error)) from None

@@ -181,8 +181,8 @@ def test_a_mistake_on_a_command_line_names_the_option(words, sentence):
         (NumberOfModes, "6", "found 6, expected at least 7, since the first 6 are rigid motions"),
         (ModelModes, "7", "found 7, expected at least 12, since pages compare half a dozen"),
         (ToleranceOrNone, "1e-16", "found 1e-16, expected 1e-15 to 1, or 0 for no tolerance"),
-        (ProvedTolerance, "0", "found 0, expected at least 1e-15, since the validation proves"),
-        (ProvedTolerance, "0.5", "found 0.5, expected at most 0.1, since the validation proves"),
+        (ProvedTolerance, "0", "found 0.0, expected at least 1e-15, since the validation holds"),
+        (ProvedTolerance, "0.5", "found 0.5, expected at most 0.1, since the validation holds"),
         (MadeCorrections, "0", "found 0, expected at least 1, since plain HCMS is"),
     ],
 )

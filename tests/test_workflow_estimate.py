@@ -180,7 +180,7 @@ def test_the_command_prints_text_and_json(capsys):
         (["--nodes", "1000000000"], "at most 100,000"),
         (["--cores-per-node", "1000000000"], "at most 10,000"),
         (["--configfile", "metal.wav"], "metal.wav: is not readable as YAML"),
-        (["--configfile", "."], ".: no such file, expected a configuration"),
+        (["--configfile", "."], ".: is a folder, expected a configuration"),
         (["--configfile", "/dev/null"], "/dev/null: no such file, expected a configuration"),
         (["--configfile", 5000 * "x"], "cannot be read (File name too long)"),
     ],

@@ -1,17 +1,18 @@
 """The configuration: one file describes a run, `workflow.configuration` what it leaves out."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
 from snakemake.utils import update_config
 
-from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.materials import NAMES as MATERIALS
-from carillon.files.yaml_input import nearest, read_marked
-from carillon.parameters.sentences import ParameterError, Place
+from carillon.files.yaml_input import nearest, read_marked, read_yaml
+from carillon.parameters.sentences import ParameterError, Place, alike
 from carillon.records import provenance
 from forests import default as default_forests
 from workflow import training
@@ -47,22 +48,28 @@ def complete(files: Iterable[str | Path], given: Values = MappingProxyType({})) 
     given
         Values that take precedence over all files.
     """
-    documents = [(str(file), *read_marked(file, CONFIGURATION)) for file in files]
+    files = list(files)
     config: dict[str, Any] = {}
-    for values in (*(values for _, values, _ in documents), given):
+    for values in (*(read_yaml(file, CONFIGURATION) for file in files), given):
         update_config(config, values)
-    try:
+    with _mistakes_in_lines(files, given):
         return completed(config)
+
+
+@contextmanager
+def _mistakes_in_lines(files: Iterable[str | Path], given: Values) -> Iterator[None]:
+    """Begin sentences about values with the file and the line that they are in."""
+    try:
+        yield
     except ParameterError as error:
-        nodes = {file: node for file, _, node in documents}
-        raise UserError(f"{_where(error.place, nodes, given)}{error}") from None
+        raise UserError(f"{_where(error.place, files, given)}{error}") from None
 
 
-def _where(place: Place, nodes: Mapping[str, Any], given: Values) -> str:
+def _where(place: Place, files: Iterable[str | Path], given: Values) -> str:
     """Beginning of a sentence: where the value at a place was written last."""
     found = [(0, "")]
-    for file, node in nodes.items():
-        steps, line = nearest(node, place)
+    for file in files:
+        steps, line = nearest(read_marked(file, CONFIGURATION)[1], place)
         found.append((steps, f"{file}, line {line}: "))
     steps, part = 0, cast("Any", given)
     while steps < len(place) and isinstance(part, Mapping) and place[steps] in part:
@@ -84,25 +91,46 @@ def config_hash(config: Mapping[str, Any]) -> str:
     )
 
 
-def check_files(config: Mapping[str, Any]) -> None:
+def check_files(
+    config: Mapping[str, Any],
+    files: Iterable[str | Path] = (),
+    given: Values = MappingProxyType({}),
+) -> None:
     """Check that a run can write, and read what its complete configuration names.
 
-    Raises UserError if the folder of the results cannot be written, or a model's mesh or material
-    or the forests do not exist.
+    `files` and `given` are what the configuration was made from, see `complete`. Raises UserError
+    if the folder of the results cannot be written, or a model's mesh or material or the forests do
+    not exist.
     """
     require_place(Path(config["results_dir"]), "results_dir")
-    for name in config["models"]:
-        for path in model_files(config, name):
-            if not Path(path).is_file():
-                raise UserError(
-                    f"models.{name}: there is no file {path}; put it there, or set mesh_folder to "
-                    "the folder that holds it"
-                )
-    forests = forests_file(config)
-    if forests is not None and not Path(forests).is_file():
-        raise UserError(
-            f"forests.model: there is no file {forests}; name one that carillon train "
-            f"wrote, {DEFAULT_FORESTS} for those of the package, or null to train some"
+    with _mistakes_in_lines(files, given):
+        for name in config["models"]:
+            _check_files_of(config, name)
+        forests = forests_file(config)
+        if forests is not None and not Path(forests).is_file():
+            raise ParameterError(
+                ("forests", "model"),
+                f"there is no file {forests}; name one that carillon train wrote, "
+                f"{DEFAULT_FORESTS} for those of the package, or null to train some",
+            )
+
+
+def _check_files_of(config: Mapping[str, Any], name: str) -> None:
+    model = config["models"][name]
+    known = {
+        "mesh": {each: f"{BUILTIN_PREFIX}{each}" for each in BUILTIN_NAMES},
+        "material": {each: each for each in MATERIALS},
+    }
+    for key, path in _files_by_key(config, name).items():
+        if Path(path).is_file():
+            continue
+        meant = alike(model[key], known[key])
+        hint = f" (did you mean {known[key][meant]}?)" if meant else ""
+        others = {"mesh": "a file or builtin:NAME", "material": f"a file or {', '.join(MATERIALS)}"}
+        raise ParameterError(
+            ("models", name, key),
+            f"found {model[key]!r}, expected {others[key]}{hint}; there is no file {path}; put it "
+            "there, or set mesh_folder to the folder that holds it",
         )
 
 
@@ -123,9 +151,13 @@ def material_of(config: Mapping[str, Any], model: str) -> str:
 
 def model_files(config: Mapping[str, Any], model: str) -> list[str]:
     """Files that a model is made from; none for a built-in object with a named material."""
+    return list(_files_by_key(config, model).values())
+
+
+def _files_by_key(config: Mapping[str, Any], model: str) -> dict[str, str]:
     mesh, material = mesh_of(config, model), material_of(config, model)
-    files = [] if mesh.startswith(BUILTIN_PREFIX) else [mesh]
-    return files if material in MATERIALS else [*files, material]
+    files = {} if mesh.startswith(BUILTIN_PREFIX) else {"mesh": mesh}
+    return files if material in MATERIALS else {**files, "material": material}
 
 
 def forests_file(config: Mapping[str, Any]) -> str | None:

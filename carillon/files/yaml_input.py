@@ -78,7 +78,8 @@ def read_marked(path: str | Path, what: str) -> tuple[dict[str, Any], yaml.Node]
     path = Path(path)
     try:
         if not path.is_file():
-            raise UserError(f"{path}: no such file, expected {what} (YAML)")
+            why = "is a folder" if path.is_dir() else "no such file"
+            raise UserError(f"{path}: {why}, expected {what} (YAML)")
         with open(path, "rb") as stream:
             content = stream.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:

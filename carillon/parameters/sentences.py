@@ -87,9 +87,8 @@ def mistake_of(
     if kind in ("value_error", "assertion_error"):
         return ParameterError(place, str(mistake["ctx"]["error"]))
     reason = f"found {shown}, expected {_expected(kind, mistake.get('ctx', {}), domain)}"
-    suggestion = alike(found, [*domain.choices, *domain.words]) if isinstance(found, str) else None
-    if suggestion:
-        reason += f" (did you mean {suggestion}?)"
+    if isinstance(found, str):
+        reason += did_you_mean(found, [*domain.choices, *domain.words])
     return ParameterError(place, reason, domain.meaning)
 
 
@@ -174,6 +173,12 @@ def alike(word: str, words: Iterable[str]) -> str | None:
     lower = {each.lower(): each for each in words}
     found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
     return lower[found[0]] if found else None
+
+
+def did_you_mean(word: str, words: Iterable[str]) -> str:
+    """Hint at what a mistyped word should be, in brackets after a blank; empty if there is none."""
+    meant = alike(word, words)
+    return f" (did you mean {meant}?)" if meant else ""
 
 
 def _in_yaml(value: Any, domain: ValueDomain) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from carillon import lazy_exports
 from carillon.errors import UserError
+from carillon.parameters.sentences import did_you_mean
 from dataset_gen.objectives.calibration import default_calibration
 
 if TYPE_CHECKING:
@@ -47,7 +48,10 @@ DEFAULT_OBJECTIVE = "calibrated"
 def require_objective(objective: str, known: Iterable[str] = OBJECTIVES) -> None:
     """Raise UserError unless `objective` is one of those known."""
     if objective not in known:
-        raise UserError(f"objective {objective!r} is unknown, choose one of {', '.join(known)}")
+        hint = did_you_mean(objective, known)
+        raise UserError(
+            f"objective {objective!r} is unknown{hint}, choose one of {', '.join(known)}"
+        )
 
 
 def closed_form(objective: str) -> str:

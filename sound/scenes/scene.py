@@ -1,6 +1,5 @@
 """A scene: the file that describes solids, how they begin to move, and who hears them."""
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
@@ -22,6 +21,7 @@ from carillon.parameters.quantities import (
     Triple,
     between,
 )
+from carillon.parameters.sentences import ParameterError
 from sound.project.settings import ShownName
 from sound.scenes.materials import NamedMaterial, named_material
 
@@ -287,9 +287,13 @@ class Scene:
     seed: Annotated[int, between(0, 2**32 - 1)] = option(0, "seed of the roughness of surfaces")
 
     def __post_init__(self) -> None:
-        counts = Counter(each.name for each in self.objects)
-        if twice := [name for name, count in counts.items() if count > 1]:
-            raise ValueError(f"several objects are named {twice[0]!r}; give each a name of its own")
+        names = [each.name for each in self.objects]
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                raise ParameterError(
+                    ("objects", number, "name"),
+                    f"several objects are named {name!r}; give each a name of its own",
+                )
 
     @property
     def files(self) -> list[str]:

@@ -11,7 +11,7 @@ from workflow import settings
 def main() -> None:
     """Load and check the configuration named."""
     load_configfile(sys.argv[1])
-    settings.check_files(settings.complete([sys.argv[1]]))
+    settings.check_files(settings.complete([sys.argv[1]]), [sys.argv[1]])
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le
 from carillon.errors import UserError
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import Seed, WorkersAnywhere
-from carillon.parameters.sentences import ParameterError
+from carillon.parameters.sentences import ParameterError, did_you_mean
 from dataset_gen.objectives import DATASET_OBJECTIVES
 from dataset_gen.sampling import DISTRIBUTIONS, moduli
 from workflow.configuration.section import File, Ranks, Several
@@ -94,13 +94,14 @@ class DatasetSection:
         for name, (low, high) in self.ranges.items():
             if name not in self.distributions:
                 known = ", ".join(self.distributions)
+                hint = did_you_mean(name, self.distributions)
                 raise ParameterError(
-                    ("ranges",), f"{name!r} is not among the distributions {known}"
+                    ("ranges", name), f"{name!r} is not among the distributions {known}{hint}"
                 )
             try:
                 moduli(name, low, high)
             except UserError as error:
-                raise ParameterError(("ranges",), str(error)) from None
+                raise ParameterError(("ranges", name), str(error)) from None
         fewest = self.samples // len(self.distributions)
         if fewest < self.shards:
             raise ParameterError(

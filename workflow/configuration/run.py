@@ -37,7 +37,7 @@ from workflow.configuration.solids import ModelEntry, ModelModes, Solids
 Names = Distinct[Line]
 ProvedTolerance = Annotated[
     Tolerance,
-    Within("the validation proves that ten times as much is kept", le=0.1),
+    Within("the validation holds spectra to ten times this error", le=0.1),
     "relative eigenvalue error at which error correction stops [1]",
 ]
 MadeCorrections = Annotated[

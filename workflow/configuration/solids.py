@@ -21,7 +21,7 @@ from carillon.parameters.quantities import (
     Resolution,
     Seed,
 )
-from carillon.parameters.sentences import alike
+from carillon.parameters.sentences import did_you_mean
 from workflow.configuration.section import File, Several, Title
 
 FILES = {"bunny": "stanford-bunny.obj", "teapot": "teapot.obj"}
@@ -33,8 +33,7 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 def _known(mesh: str) -> str:
     if mesh.startswith(BUILTIN_PREFIX) and mesh.removeprefix(BUILTIN_PREFIX) not in BUILTIN_NAMES:
-        meant = alike(mesh.removeprefix(BUILTIN_PREFIX), BUILTIN_NAMES)
-        hint = f" (did you mean {meant}?)" if meant else ""
+        hint = did_you_mean(mesh.removeprefix(BUILTIN_PREFIX), BUILTIN_NAMES)
         known = ", ".join(BUILTIN_NAMES)
         raise ValueError(f"{mesh}: no such built-in object{hint}, expected one of {known}")
     return mesh

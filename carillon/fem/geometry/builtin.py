@@ -18,7 +18,7 @@ from trimesh.transformations import rotation_matrix
 from carillon import builtin_names
 from carillon.errors import UserError
 from carillon.fem.geometry.sweep import SECTIONS, joined, spline, sweep, tube, turned
-from carillon.parameters.sentences import alike
+from carillon.parameters.sentences import did_you_mean
 
 SIDE = 0.24
 """Longest side of most trial solids [m]."""
@@ -274,8 +274,7 @@ def builtin_surface(name: str) -> trimesh.Trimesh:
     """
     known = {**BUILTINS, **THIN, **TRIALS}
     if name not in known:
-        meant = alike(name, known)
-        hint = f" (did you mean {meant}?)" if meant else ""
+        hint = did_you_mean(name, known)
         raise UserError(
             f"builtin:{name}: no such built-in object{hint}, expected one of {', '.join(known)}"
         )
