@@ -15,6 +15,8 @@ from carillon.command_line.commands import Command, run_program
 LONGER = {"dataset_gen": {"inspect": "inspect-shard"}, "forests": {"inspect": "inspect-forests"}}
 """Names of commands of a room that another room has too."""
 STUDY = "study"
+REMOVED = {"calibrate": "which is gone: the constants of the objective calibrated are kept"}
+"""What became of commands of earlier versions."""
 
 
 def commands() -> dict[str, Command]:
@@ -41,12 +43,15 @@ def main(words: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if words is None else list(words)
     if given[:1] == [STUDY]:
         description = "Experiments: what was measured, and the pages that show it."
-        return run_program(f"carillon {STUDY}", description, studies(), given[1:])
+        words = given[1:] or ["--help"]
+        return run_program(f"carillon {STUDY}", description, studies(), words)
     description = (
         "Vibration modes of solids with spatially varying material, fast enough to design sound."
     )
-    older = {name: command for name, command in studies().items() if command.room}
-    return run_program("carillon", description, commands(), given, older)
+    known = studies()
+    older = {name: command for name, command in known.items() if command.room}
+    elsewhere = {name: f"did you mean 'carillon {STUDY} {name}'?" for name in known}
+    return run_program("carillon", description, commands(), given, older, elsewhere | REMOVED)
 
 
 if __name__ == "__main__":

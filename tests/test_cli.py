@@ -246,6 +246,35 @@ def test_complaints_that_nobody_takes_change_no_status(tmp_path):
     assert subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT).returncode == 2
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("rules x", "carillon: unrecognized arguments: x (see carillon rules --help)"),
+        ("calibrate", "carillon: no command 'calibrate', which is gone: the constants of"),
+        ("claims", "carillon: no command 'claims', did you mean 'carillon study claims'?"),
+        ("validat", "carillon: no command 'validat', did you mean 'validate'?"),
+        ("study objectives m --objectives energi", "'energi' is unknown (did you mean energy?)"),
+        (
+            "validate builtin:barr --resolution 12 --out o",
+            "carillon validate: mesh: builtin:barr: no such built-in object (did you mean bar?)",
+        ),
+        (
+            "validate builtin:bar --resolution 12 --out {o",
+            "carillon validate: --out: '",
+        ),
+    ],
+)
+def test_a_mistaken_command_line_points_to_what_was_meant(capsys, words, says):
+    assert main(words.split()) == exit_status.EXIT_BAD_INPUT
+    assert says in capsys.readouterr().err
+
+
+def test_study_alone_lists_the_studies(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["study"])
+    assert ended.value.code == 0 and "claims" in capsys.readouterr().out
+
+
 def test_a_page_command_hands_options_on(monkeypatch):
     started = []
     monkeypatch.setattr(

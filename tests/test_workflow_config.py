@@ -3,8 +3,10 @@
 import copy
 import re
 from importlib import import_module
+from pathlib import Path
 
 import pytest
+import snakemake.utils
 import yaml
 
 from carillon.builtin_names import BUILTIN_NAMES
@@ -104,11 +106,50 @@ def test_a_bad_value_is_answered_in_one_sentence(keys, value, says):
 def test_a_missing_mesh_file_and_an_unknown_model_are_named(tmp_path):
     config = load("meshes")
     config["mesh_folder"] = str(tmp_path)
-    with pytest.raises(UserError, match=r"models\.bunny: there is no file .*stanford-bunny\.obj"):
+    with pytest.raises(UserError, match=r"models\.bunny\.mesh: .* no file .*stanford-bunny\.obj"):
         settings.check_files(config)
     config["models"] = {"bell": config["models"]["bell"]}
     with pytest.raises(UserError, match="'bunny' is not among the models bell"):
         completed(config)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            {"models": {"bell": {"material": "smoth"}}},
+            "c.yaml, line 5: models.bell.material: found 'smoth', expected a file or uniform, ",
+        ),
+        ({"models": {"bell": {"material": "smoth"}}}, " (did you mean smooth?); there is no file "),
+        (
+            {"models": {"bell": {"mesh": "nope.obj"}}},
+            "c.yaml, line 4: models.bell.mesh: found 'nope.obj', expected a file or builtin:NAME; "
+            "there is no file meshes/nope.obj; put it there, or set mesh_folder",
+        ),
+        ({"models": {"bell": {"mesh": "bel"}}}, "NAME (did you mean builtin:bell?); there is"),
+        ({"forests": {"model": "a.h5"}}, "c.yaml, line 9: forests.model: there is no file a.h5"),
+        (
+            {"dataset": {"ranges": {"unifrm": [0, 1]}}},
+            "c.yaml, line 12: dataset.ranges.unifrm: 'unifrm' is not among the distributions "
+            "uniform, log-uniform (did you mean uniform?)",
+        ),
+        ({"solver": None}, "c.yaml, line 7: solver: found nothing, expected keys and values"),
+        ({"title": False}, "c.yaml, line 1: title: found false, as YAML reads no and off without"),
+    ],
+)
+def test_what_a_file_names_wrongly_is_told_with_line_and_key(tmp_path, monkeypatch, change, says):
+    config = {
+        "title": "t",
+        "models": {"bell": {"mesh": "builtin:bell", "material": "smooth", "resolution": 20}},
+        "solver": {},
+        "forests": {"model": "default"},
+        "dataset": {"ranges": {}},
+    }
+    snakemake.utils.update_config(config, change)
+    monkeypatch.chdir(tmp_path)
+    Path("c.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+    with pytest.raises(UserError, match=re.escape(says)):
+        settings.check_files(settings.complete(["c.yaml"]), ["c.yaml"])
 
 
 @pytest.mark.parametrize(

@@ -68,8 +68,19 @@ def test_the_page_has_every_key():
     assert all(f"| `{rule}` |" in text for rule in limits())
 
 
+def test_the_page_lists_every_preset():
+    lines = schema_keys.of_presets().splitlines()
+    assert [line.split("`")[1] for line in lines] == sorted(
+        f.stem for f in CONFIGURATIONS.glob("*.yaml")
+    )
+    assert "- `laptop`: The default run: four solids on two cores in a few minutes." in lines
+
+
 def test_the_page_tells_type_default_unit_and_meaning():
     text = schema_keys.of_configuration()
+    assert "hyphens. Required." in text
+    tolerance = text[text.index("`solver.tolerance` ") :].split("\n")[0]
+    assert "at least 1e-15, at most 0.1, since the validation holds spectra to ten" in tolerance
     assert "`dataset.shards` integer, at least 1, at most 10,000; default `2`\n: " in text
     density = text[text.index("`models.NAME.density` ") :].split("\n\n")[0]
     assert " [kg/m^3]; default `1000.0`\n: Mass density." in density

@@ -2,7 +2,8 @@
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NoReturn
 
 from carillon.errors import UserError
@@ -15,7 +16,10 @@ class Parser(argparse.ArgumentParser):
     """Argument parser that raises UserError instead of printing its usage.
 
     It takes -1e-3 for a number, as later versions of Python do by themselves, not for an option.
+    `elsewhere` says of words that are no commands here what to type in their place.
     """
+
+    elsewhere: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -41,7 +45,10 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             suggestion = alike(str(value), map(str, action.choices))
-            if suggestion and isinstance(action, argparse._SubParsersAction):
+            is_command = isinstance(action, argparse._SubParsersAction)
+            if is_command and value in self.elsewhere:
+                self.error(f"no command {value!r}, {self.elsewhere[value]}")
+            if suggestion and is_command:
                 self.error(f"no command {value!r}, did you mean {suggestion!r}?")
             if suggestion:
                 shown = ", ".join(map(repr, action.choices))

@@ -51,6 +51,7 @@ def run_program(
     commands: Mapping[str, Command],
     words: Sequence[str] | None = None,
     unlisted: Mapping[str, Command] = MappingProxyType({}),
+    elsewhere: Mapping[str, str] = MappingProxyType({}),
 ) -> int:
     """Run the command that a command line names; returns the exit status, the same on every rank.
 
@@ -62,6 +63,8 @@ def run_program(
         The command line, that of this process if None.
     unlisted
         Further commands, which the help does not list.
+    elsewhere
+        What to type in place of words that are no commands of this program.
     """
     present_folder.ignore_modules(os.environ, sys.path)
     mpi_environment.keep_apart(os.environ, os.getpid())
@@ -82,10 +85,12 @@ def run_program(
     @on_all_ranks()
     def parse() -> None:
         parser = _parser(name, description, commands, unlisted, given)
+        parser.elsewhere = elsewhere
         arguments, arguments.further = parser.parse_known_args(given)
         command = arguments.command
         if arguments.further and not hasattr(_module(everything[command]), "FURTHER"):
-            parser.error(f"unrecognized arguments: {' '.join(arguments.further)}")
+            of_command = Parser(prog=f"{name} {command}")
+            of_command.error(f"unrecognized arguments: {' '.join(arguments.further)}")
         chosen.append(arguments)
         if comm is not None and not everything[command].ranks:
             chosen.clear()

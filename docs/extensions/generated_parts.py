@@ -15,6 +15,7 @@ PARTS: dict[str, Callable[..., str]] = {
     "rooms": rooms_picture.of_rooms,
     "packages": rooms_picture.of_packages,
     "configuration": schema_keys.of_configuration,
+    "presets": schema_keys.of_presets,
     "project": schema_keys.of_project,
     "scene": schema_keys.of_scene,
     "examples": gallery.of_examples,

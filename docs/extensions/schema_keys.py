@@ -1,10 +1,13 @@
 """Keys of the configuration, of projects and of scenes as lists; their materials as a table."""
 
+from itertools import takewhile
+
 import parameter_tables
 
 from sound.project.project import Project
 from sound.scenes.materials import MATERIALS, named_material
 from sound.scenes.scene import Scene
+from workflow import settings
 from workflow.configuration.whole import limits, whole
 
 _HEAD = (
@@ -25,6 +28,16 @@ def _limits_of_rules() -> str:
     ]
     head = ["", "| rule | a job makes | memory [MB] | time [min] |", "| --- | --- | --: | --: |"]
     return "\n".join([*head, *rows, ""])
+
+
+def of_presets() -> str:
+    """A line for each preset: its name and the first sentence in its file."""
+    lines = []
+    for path in sorted((settings.FOLDER / "config").glob("*.yaml")):
+        head = takewhile(lambda line: line.startswith("#"), path.read_text().splitlines())
+        sentence = " ".join(line.lstrip("# ") for line in head).partition(". ")[0].rstrip(".")
+        lines.append(f"- `{path.stem}`: {sentence}.")
+    return "\n".join(lines) + "\n"
 
 
 def of_project() -> str:

@@ -105,7 +105,12 @@ for what, keys, says in (
     nothing = {"radius": "", "count": "", "material": ""}
     files = {"s.yaml": scene(ball(**nothing | keys)), "m.h5": MODES, "d.h5": DESIGN}
     hostile(f"object of {what}", PLAY, says, files=files)
-hostile("two objects of one name", PLAY, "'b'", files={"s.yaml": scene(ball(), ball())})
+hostile(
+    "two objects of one name",
+    PLAY,
+    "line 4: objects[1].name",
+    files={"s.yaml": scene(ball(), ball())},
+)
 hostile(
     "two objects in each other",
     PLAY,

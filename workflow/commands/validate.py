@@ -11,6 +11,7 @@ import yaml
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.command_line.progress import say
+from carillon.errors import UserError
 from carillon.fem.geometry import surface_name
 from carillon.fem.geometry.size import sizes_in_words
 from carillon.fem.materials import NAMES as MATERIALS
@@ -19,6 +20,7 @@ from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import NonNegative, Point, Positive, Workers, between
+from carillon.parameters.sentences import ParameterError, Place
 from carillon.processes.threads import allowed_cores
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import load_forest
@@ -110,7 +112,10 @@ def run(arguments: argparse.Namespace) -> int:
     Raises UserError if the solid cannot be made, or the run fails.
     """
     config = configuration(arguments)
-    completed(config)
+    try:
+        completed(config)
+    except ParameterError as error:
+        raise UserError(f"{_option(error.place)}: {error.reason}") from None
     say("reading the mesh, making its voxels", sys.stderr.isatty())
     size = _checked_size(arguments)
     name = next(iter(config["models"]))
@@ -133,6 +138,15 @@ def run(arguments: argparse.Namespace) -> int:
     print(told[0]["told"])
     print(page)
     return FAILED if missed else 0
+
+
+def _option(place: Place) -> str:
+    """The argument that a value of the configuration is from."""
+    keys = [str(key) for key in place if isinstance(key, str)]
+    if "mesh" in keys or "tolerances" in keys:
+        return "mesh" if "mesh" in keys else "--tolerances"
+    last = {"results_dir": "out", "title": "name", "model": "forest"}.get(keys[-1], keys[-1])
+    return f"--{last.replace('_', '-')}"
 
 
 def configuration(arguments: argparse.Namespace) -> dict[str, Any]:

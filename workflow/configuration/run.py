@@ -232,7 +232,7 @@ class ScalingSection(MeasuredSection):
 
 @parameters
 class Configuration:
-    """One file describes a run; keys that it leaves out take the defaults written here."""
+    """One file describes a run; all keys but `models` have the defaults written here."""
 
     _: KW_ONLY
     title: Title = option("Spectra of heterogeneous solids", "heading of the report")
