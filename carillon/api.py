@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +24,21 @@ from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, load_surface, surface_name, voxelize
 from carillon.fem.geometry.surface import surface_of_triangles
-from carillon.fem.model import DEFAULT_DENSITY, Constants, Solid, fine_model
-from carillon.limits import require_constants
+from carillon.fem.model import DEFAULT_DENSITY, Constants, Damping, Solid, fine_model
+from carillon.fem.moduli import require_moduli
+from carillon.parameters import Check, checked, parameters
+from carillon.parameters.quantities import (
+    Count,
+    Density,
+    Discretisation,
+    MetresPerUnit,
+    PoissonRatio,
+    RayleighDamping,
+    Resolution,
+    Seed,
+    Tolerance,
+    Workers,
+)
 
 if TYPE_CHECKING:
     import trimesh
@@ -90,7 +103,7 @@ class Mesh:
     def hexahedra(self, resolution: int) -> HexMesh:
         """The voxels inside, `resolution` of them along the longest side.
 
-        Raises UserError if they do not hold together.
+        Raises UserError if there can be no such voxels, or they do not hold together.
         """
         return hexmesh_from_voxels(voxelize(self.surface, resolution, name=self.name))
 
@@ -106,12 +119,23 @@ def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     >>> ca.load_mesh("builtin:plate", unit=0.5).extents.round(3).tolist()
     [0.12, 0.12, 0.019]
     """
-    return Mesh(load_surface(str(path), unit), surface_name(str(path)))
+    if not isinstance(path, str | Path):
+        raise UserError(f"found {path!r:.80}, expected the path of a mesh file, or builtin:NAME")
+    metres = checked("unit", unit, MetresPerUnit)
+    return Mesh(load_surface(str(path), metres), surface_name(str(path)))
 
 
-@dataclass(frozen=True, eq=False)
+def _young(young: Young) -> Young:
+    if not isinstance(young, str) and not callable(young):
+        _numbers("young", young, 2, "a modulus [Pa], an array, a name or a function")
+    return young
+
+
+@parameters
 class Material:
-    """Material of a solid: its moduli, Poisson's ratio and density.
+    """Material of a solid: its moduli, Poisson's ratio, density and damping.
+
+    Raises UserError for a constant that no material has.
 
     Examples
     --------
@@ -120,18 +144,22 @@ class Material:
     7850.0
     """
 
-    young: Young = 1e9
+    young: Annotated[Young, Check(_young, alone=True)] = 1e9
     """Young's modulus [Pa]: one; the name of a field (`uniform`, `smooth`, `two-region`, `random`,
     `noise`) or a file of moduli; one for each voxel (m,), or for each of their quadrature points
     (m, 8); or a function of the voxels' centres (m, 3) [m] that returns (m,)."""
-    poisson: float = DEFAULT_POISSON
+    poisson: PoissonRatio = DEFAULT_POISSON
     """Poisson's ratio."""
-    density: float = DEFAULT_DENSITY
+    density: Density = DEFAULT_DENSITY
     """Mass density [kg/m^3]."""
-    damping: tuple[float, float] = DAMPING
-    """Rayleigh's coefficients of mass [1/s] and of stiffness [s], for `render`."""
-    seed: int = 0
+    damping: RayleighDamping = DAMPING
+    """Rayleigh's coefficients of mass [1/s] and of stiffness [s], taken by `render`."""
+    seed: Seed = 0
     """Seed of the fields that are drawn."""
+
+    # Arrays of moduli have no truth value.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     @classmethod
     def named(cls, name: str) -> Self:
@@ -147,15 +175,27 @@ class Material:
     def moduli(self, mesh: HexMesh) -> Array:
         """Young's modulus (m,), or (m, 8) if given so, of the voxels of a mesh [Pa].
 
-        Raises UserError if a name or a file is unknown; what is wrong with numbers is said when
-        they are used.
+        Raises UserError if a name or a file is unknown, or for an array of another shape or of
+        values that no material has.
         """
         if isinstance(self.young, str):
+            _require_no_material(self.young)
             return materials.young_modulus(self.young, mesh, self.seed)
         if callable(self.young):
-            return np.asarray(self.young(mesh.origin + mesh.edge * (mesh.grid + 0.5)), dtype=float)
-        young = np.asarray(self.young, dtype=float)
-        return np.full(mesh.n_cells, young) if young.ndim == 0 else young
+            young = self.young(mesh.origin + mesh.edge * (mesh.grid + 0.5))
+        else:
+            young = np.full(mesh.n_cells, self.young) if np.ndim(self.young) == 0 else self.young
+        return require_moduli(young, mesh.n_cells, "young")
+
+
+def _require_no_material(young: str) -> None:
+    """Say how a material such as brass is given, where its name stands in place of a modulus."""
+    from sound.scenes.materials import MATERIALS
+
+    if young in MATERIALS and not Path(young).exists():
+        raise UserError(
+            f"young: found {young!r}, the name of a material; give Material.named({young!r})"
+        )
 
 
 Given = Material | Young | None
@@ -196,14 +236,16 @@ class Solution:
 
         from carillon.drawing.solid import draw
 
-        if not 1 <= mode <= len(self.frequencies):
-            raise UserError(f"mode {mode}: expected 1 to {len(self.frequencies)}")
+        numbers = range(1, len(self.frequencies) + 1)
+        if mode not in numbers:
+            raise UserError(f"mode {mode!r}: expected a whole number, 1 to {len(numbers)}")
+        index = numbers.index(mode)
         file = self._file()
         assert file.modes is not None
         figure = Figure(figsize=(6.0, 4.5), layout="constrained")
         axes = figure.add_subplot(projection="3d")
-        draw(axes, file.model.hexmesh, file.modes[:, mode - 1])
-        axes.set_title(f"mode {mode}, {self.frequencies[mode - 1]:.4g} Hz")
+        draw(axes, file.model.hexmesh, file.modes[:, index])
+        axes.set_title(f"mode {mode}, {self.frequencies[index]:.4g} Hz")
         return figure
 
     def save(self, path: str | Path) -> None:
@@ -308,7 +350,8 @@ def solve(
 
     ranks = MPI.COMM_WORLD if comm is None else comm
     solid = compute_on_root(ranks, lambda: _solid(body, material, resolution, discretisation))
-    start = None if initial is None or initial.shapes is None else initial._file().modes
+    is_elsewhere = isinstance(initial, Solution) and initial.shapes is None
+    start = None if initial is None or is_elsewhere else _modes_of(initial).modes
     result = library.solve(
         solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
     )
@@ -353,7 +396,11 @@ def coarsen(
     file = forests.path if isinstance(forests, Forests) else forests
     coarsening = make_coarsening(method, fine.poisson, file)
     young = fine.young[:, 0] if fine.young.ndim > 1 else fine.young
-    constants: Constants = {"poisson": fine.poisson, "density": fine.density}
+    constants: Constants = {
+        "poisson": fine.poisson,
+        "density": fine.density,
+        "damping": fine.damping,
+    }
     return build_model(fine.mesh, young, coarsening, **constants)
 
 
@@ -381,10 +428,11 @@ def read(path: str | Path) -> Solution | Design:
     return Solution(*values, _shapes(file.modes), file.model, file.attributes)
 
 
-def compare(solution: Solution, truth: Solution) -> SpectrumComparison:
+def compare(solution: Solution | str | Path, truth: Solution | str | Path) -> SpectrumComparison:
     """How far a spectrum is from another that is taken for the truth, on any two meshes.
 
-    Raises UserError if they are of other solids, or one has no elastic modes.
+    Each may be a modes file. Raises UserError if one is unusable or has no elastic modes, or they
+    are of other solids.
 
     Examples
     --------
@@ -394,7 +442,7 @@ def compare(solution: Solution, truth: Solution) -> SpectrumComparison:
     """
     from solver.verification.comparison import compare_modes
 
-    return compare_modes(solution._file(), truth._file())
+    return compare_modes(_modes_of(solution), _modes_of(truth))
 
 
 def audit(solution: Solution | str | Path, tolerance: float = 1e-7) -> Audit:
@@ -416,11 +464,9 @@ def audit(solution: Solution | str | Path, tolerance: float = 1e-7) -> Audit:
     >>> found.faults, found.counted == found.expected
     ([], True)
     """
-    from solver.files.modes_file import read_modes
     from solver.verification import audit as audits
 
-    file = solution._file() if isinstance(solution, Solution) else read_modes(solution)
-    return audits.audit(file, tolerance)
+    return audits.audit(_modes_of(solution), checked("tolerance", tolerance, Tolerance))
 
 
 def render(
@@ -433,12 +479,13 @@ def render(
     seconds: float | None = None,
     rate: int = SAMPLE_RATE,
     contact_seconds: float = 0.0,
-    damping: tuple[float, float] = DAMPING,
+    damping: tuple[float, float] | None = None,
 ) -> Array:
     """Samples (s,) of the sound of one strike or of many.
 
     Those of a design are of full scale as its clips; those of a solution are scaled to 1 dB below.
-    Raises UserError if a point is far from the surface, a target unknown, or nothing sounds.
+    Raises UserError for values that are out of range, if a point is far from the surface or a
+    target unknown, or if nothing sounds.
 
     Parameters
     ----------
@@ -453,13 +500,14 @@ def render(
     times : float or (p,)
         When [s].
     seconds
-        Length; until all has decayed unless given.
+        Length, at most 600 s; until all has decayed unless given.
     rate
         Samples per second [Hz].
     contact_seconds
         Duration of the force, half a sine; 0 is an impulse.
     damping
-        Of a solution: Rayleigh's coefficients of mass [1/s] and of stiffness [s].
+        Of a solution: Rayleigh's coefficients of mass [1/s] and of stiffness [s]; those of its
+        material unless given, and of a file that does not tell them `Material`'s default.
 
     Examples
     --------
@@ -468,30 +516,28 @@ def render(
     >>> samples.shape, float(abs(samples).max().round(2))
     ((22050,), 0.89)
     """
+    from sound.bounds import require_length
     from sound.clips.wav import PEAK
-    from sound.rendering.render import Hit, ringing_seconds
     from sound.rendering.render import render as rendered
-    from sound.rendering.strike_list import Point
+    from sound.rendering.render import ringing_seconds
+    from sound.rendering.strikes_of_call import StrikesOfCall, listed
 
-    heard = _heard(source, damping)
-    if (at is None) == (target is None):
-        raise UserError("expected at, the points that are struck, or target, the name of one")
-    points = [Point(target=target)]
-    if at is not None:
-        places = np.asarray(at, dtype=float).reshape(-1, 3).tolist()
-        points = [Point(at=(x, y, z)) for x, y, z in places]
-    struck = heard.places([("at", point) for point in points])
-    count = len(points)
-    hits = [
-        Hit(float(begin), position, float(impulse) * inward, distance)
-        for begin, impulse, (position, inward, distance) in zip(
-            np.broadcast_to(np.asarray(times, dtype=float), count),
-            np.broadcast_to(np.asarray(strength, dtype=float), count),
-            struck,
-        )
-    ]
-    length = seconds or max(hit.seconds for hit in hits) + ringing_seconds(heard.solid)
-    samples = rendered(heard.solid, hits, length, rate, contact_seconds, heard.listening)
+    strikes = StrikesOfCall(
+        at=None if at is None else listed(at, 2),
+        target=target,
+        strength=listed(strength, 1),
+        times=listed(times, 1),
+        seconds=seconds,
+        rate=rate,
+        contact_seconds=contact_seconds,
+        damping=damping,
+    )
+    heard = _heard(source, strikes.damping)
+    hits = strikes.hits(heard)
+    length = strikes.seconds or max(strikes.times) + ringing_seconds(heard.solid)
+    require_length(length, strikes.rate)
+    how = (strikes.rate, strikes.contact_seconds, heard.listening)
+    samples = rendered(heard.solid, hits, length, *how)
     peak = float(np.abs(samples).max(initial=0.0))
     return samples * (PEAK / peak) if heard.listening is None and peak > 0.0 else samples
 
@@ -499,7 +545,8 @@ def render(
 def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> None:
     """Write samples (s,), full scale being 1, as a sound file.
 
-    Raises UserError if it cannot be written, or its name does not end in .wav.
+    Raises UserError if they are no numbers or none at all, or cannot be written, or the name does
+    not end in .wav.
 
     Examples
     --------
@@ -507,9 +554,11 @@ def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> 
     >>> with TemporaryDirectory() as folder:
     ...     ca.write_wav(f"{folder}/tone.wav", np.sin(0.1 * np.arange(2000)))
     """
+    from sound.bounds import SampleRate
     from sound.clips.wav import write_wav as write
 
-    write(path, np.asarray(samples, dtype=float), rate)
+    hertz = checked("rate", rate, SampleRate)
+    write(path, _numbers("samples", samples, 2, "samples (s,)"), hertz)
 
 
 def extract(
@@ -533,12 +582,15 @@ def extract(
     >>> ca.extract(clip, 8000).frequencies.round(2).tolist()
     [440.0]
     """
+    from sound.bounds import SampleRate
     from sound.clips import extraction
     from sound.clips.files import extract_file
 
+    count = checked("modes", modes, Count | None)
     if isinstance(clip, str | Path):
-        return extract_file(clip, modes)
-    return extraction.extract(np.asarray(clip, dtype=float), rate, modes)
+        return extract_file(clip, count)
+    hertz = checked("rate", rate, SampleRate)
+    return extraction.extract(_numbers("clip", clip, 1, "a file or samples (s,)"), hertz, count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -696,7 +748,7 @@ def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -
     asked = ShardOptions(samples=samples, **options)
     settings = settings_of(asked)
     plan, origin = ShardPlan(settings), origin_of(settings, asked)
-    generate_file(path, plan, origin, engine_of(workers))
+    generate_file(path, plan, origin, engine_of(checked("workers", workers, Workers)))
 
 
 def train(
@@ -722,7 +774,7 @@ def train(
     from forests.training.train import TrainingOptions, model_of, train_trees
 
     training, dataset = TrainingOptions(**options), open_dataset([str(path) for path in shards])
-    trained = train_trees(dataset, training, Ranks(None), workers)
+    trained = train_trees(dataset, training, Ranks(None), checked("workers", workers, Workers))
     assert trained is not None
     save_model(out, model_of(dataset, training, trained))
     return Forests.load(out)
@@ -735,33 +787,57 @@ def _shapes(modes: Array | None) -> Array | None:
 
 def _solid(body: Body, given: Given, resolution: int, discretisation: str) -> Solid:
     made = given if isinstance(given, Material) else Material(1e9 if given is None else given)
-    require_constants(made.poisson, made.density)
     if isinstance(body, Solid):
         solid = body if given is None else body.with_young(made.moduli(body.mesh))
-        if isinstance(given, Material):
-            solid = solid.with_constants(made.poisson, made.density)
-        return solid
-    constants: Constants = {"poisson": made.poisson, "density": made.density}
-    if isinstance(body, HexMesh):
-        return fine_model(body, made.moduli(body), **constants)
-    mesh = body if isinstance(body, Mesh) else load_mesh(body)
-    if discretisation == "voxel":
-        hexahedra = mesh.hexahedra(resolution)
-        return fine_model(hexahedra, made.moduli(hexahedra), **constants)
-    if discretisation != "finite-cell":
-        raise UserError(f"discretisation {discretisation!r}: expected voxel or finite-cell")
+        if not isinstance(given, Material):
+            return solid
+    elif isinstance(body, HexMesh):
+        solid = fine_model(body, made.moduli(body))
+    else:
+        mesh = body if isinstance(body, Mesh) else load_mesh(body)
+        solid = _meshed(mesh, made, resolution, discretisation)
+    return solid.with_constants(made.poisson, made.density, made.damping)
+
+
+def _meshed(mesh: Mesh, material: Material, resolution: int, discretisation: str) -> Solid:
+    count = checked("resolution", resolution, Resolution)
+    if checked("discretisation", discretisation, Discretisation) == "voxel":
+        hexahedra = mesh.hexahedra(count)
+        return fine_model(hexahedra, material.moduli(hexahedra))
     from carillon.fem.finite_cells.build import finite_cells
     from carillon.fem.finite_cells.model import finite_cell_model
 
-    cells = finite_cells(mesh.surface, resolution, name=mesh.name)
-    return finite_cell_model(cells, made.moduli(cells.mesh), made.poisson, made.density)
+    cells = finite_cells(mesh.surface, count, name=mesh.name)
+    return finite_cell_model(cells, material.moduli(cells.mesh))
 
 
-def _heard(source: Solution | Design | str | Path, damping: tuple[float, float]) -> HeardSolid:
-    from solver.response.response import Damping
+def _modes_of(solution: Solution | str | Path) -> ModesFile:
+    from solver.files.modes_file import read_modes
+
+    if isinstance(solution, Solution):
+        return solution._file()
+    if isinstance(solution, str | Path):
+        return read_modes(solution)
+    raise UserError(f"found {solution!r:.100}, expected a solution or the path of a modes file")
+
+
+def _heard(source: Solution | Design | str | Path, damping: Damping | None) -> HeardSolid:
     from sound.rendering.heard_solid import heard_design, heard_modes
 
     opened = read(source) if isinstance(source, str | Path) else source
-    if isinstance(opened, Design):
-        return heard_design(opened.found)
-    return heard_modes(opened._file(), Damping(*damping))
+    if not isinstance(opened, Design):
+        return heard_modes(_modes_of(opened), damping)
+    if damping is not None:
+        raise UserError("damping: goes with a solution; a design has dampings of its own")
+    return heard_design(opened.found)
+
+
+def _numbers(name: str, values: ArrayLike, axes: int, expected: str) -> Array:
+    """Real numbers, one at least, in an array of so many axes at most."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # Of lists that differ in length.
+        array = np.empty(0)
+    if array.dtype.kind not in "fiu" or not array.size or array.ndim > axes:
+        raise UserError(f"{name}: found {values!r:.80}, expected {expected}")
+    return np.atleast_1d(array.astype(float))

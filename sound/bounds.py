@@ -16,6 +16,8 @@ MOST_SAMPLES = 1 << 26
 memory."""
 LONGEST_SOUND = 600.0
 """Greatest length [s] of a rendered sound."""
+LONGEST_CONTACT = 1.0
+"""Greatest duration of a strike's force [s]."""
 LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
 """Least and greatest impulse of a strike [N s]."""
 QUIETEST, LOUDEST = 1e-9, 1e6
@@ -23,6 +25,8 @@ QUIETEST, LOUDEST = 1e-9, 1e6
 
 SampleRate = Annotated[int, between(LOWEST_RATE, HIGHEST_RATE)]
 """Samples per second [Hz]."""
+ContactSeconds = Annotated[float, between(0.0, LONGEST_CONTACT)]
+"""Duration of a strike's force [s]; 0 is an impulse."""
 
 
 def require_level(peak: float) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+import pickle
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,7 +11,15 @@ from annotated_types import Ge, Le
 
 from carillon.command_line.arguments import Parser
 from carillon.errors import UserError
-from carillon.parameters import REQUIRED, Check, OneOf, option, parameters, quantities
+from carillon.parameters import (
+    REQUIRED,
+    Check,
+    OneOf,
+    checked,
+    option,
+    parameters,
+    quantities,
+)
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.documents import parameters_from, read_parameters
 from carillon.parameters.fields import domain_of, parameters_of
@@ -84,6 +93,28 @@ def test_construction_converts_numbers_of_numpy_and_lists():
     assert dataclasses.replace(solid, resolution=9).resolution == 9
     with pytest.raises(dataclasses.FrozenInstanceError):
         solid.resolution = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"resolution": "8"}, "resolution: found '8', expected a whole number: voxels"),
+        ({"resolution": True}, "resolution: found True, expected a whole number: voxels"),
+        ({"resolution": 8, "density": "7850"}, "density: found '7850', expected a number: mass"),
+    ],
+)
+def test_construction_takes_no_text_for_a_number(values, sentence):
+    with pytest.raises(ParameterError) as error:
+        Solid(**values)
+    assert sentence in str(error.value)
+    sent = pickle.loads(pickle.dumps(error.value))
+    assert (str(sent), sent.place) == (str(error.value), error.value.place)
+
+
+def test_a_value_of_a_call_is_checked_as_parameters_are():
+    assert checked("density", np.float32(2.0), Density) == 2.0
+    with pytest.raises(ParameterError, match="density: found 0, expected at least 0.001 kg/m"):
+        checked("density", 0.0, Density)
 
 
 @pytest.mark.parametrize(

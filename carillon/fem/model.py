@@ -22,6 +22,10 @@ DEFAULT_DENSITY = 1000.0
 """Mass density [kg/m^3] where none is given."""
 
 
+Damping = tuple[float, float]
+"""Rayleigh's coefficients of mass [1/s] and of stiffness [s]."""
+
+
 class Solid(ABC):
     """A solid with material in one discretisation."""
 
@@ -32,6 +36,8 @@ class Solid(ABC):
     poisson: float
     density: float
     """Poisson's ratio and mass density [kg/m^3]."""
+    damping: Damping | None
+    """Rayleigh's coefficients of mass [1/s] and of stiffness [s], if they are known."""
 
     @property
     def n_dofs(self) -> int:
@@ -73,10 +79,12 @@ class Solid(ABC):
     def with_young(self, young: Array) -> Self:
         """The same solid with other moduli [Pa], see `element_moduli`."""
 
-    def with_constants(self, poisson: float, density: float) -> Self:
-        """The same solid with another Poisson's ratio and mass density [kg/m^3]."""
+    def with_constants(
+        self, poisson: float, density: float, damping: Damping | None = None
+    ) -> Self:
+        """The same solid with another Poisson's ratio, mass density [kg/m^3] and damping."""
         # Every kind of solid is a dataclass.
-        return replace(cast(Any, self), poisson=poisson, density=density)
+        return replace(cast(Any, self), poisson=poisson, density=density, damping=damping)
 
     @property
     @abstractmethod
@@ -112,6 +120,7 @@ class ElasticModel(Solid):
     """Share of lumped in the mass of cells whose octants are all filled; the rest is consistent. A
     mixture disperses less than either (`dataset_gen.objectives.lumped_share`). In a mixed mesh the
     mass of fine cells has none."""
+    damping: Damping | None = None
 
     @property
     def elements(self) -> HexElements:
@@ -157,6 +166,7 @@ class Constants(TypedDict, total=False):
     poisson: float
     density: float
     lumped: bool
+    damping: Damping | None
 
 
 def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:

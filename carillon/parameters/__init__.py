@@ -5,6 +5,14 @@ command lines (`command_line`), the reading of files (`documents`), the sentence
 (`sentences`) and the tables of the documentation (`fields`).
 """
 
-from carillon.parameters.model import REQUIRED, Check, OneOf, Within, option, parameters
+from carillon.parameters.model import (
+    REQUIRED,
+    Check,
+    OneOf,
+    Within,
+    checked,
+    option,
+    parameters,
+)
 
-__all__ = ["REQUIRED", "Check", "OneOf", "Within", "option", "parameters"]
+__all__ = ["REQUIRED", "Check", "OneOf", "Within", "checked", "option", "parameters"]

@@ -8,15 +8,13 @@ from typing import Any, TypeVar
 from carillon.errors import UserError
 from carillon.files.yaml_input import line_of, read_marked
 from carillon.parameters.fields import ValueDomain, parameters_of
-from carillon.parameters.model import adapter
+from carillon.parameters.model import EXACT, adapter
 from carillon.parameters.sentences import ParameterError, Place, mistake_of, no_key
 
 T = TypeVar("T")
 
 MOST_BITS = 4096
 """Length of a whole number; Python does not write out those of thousands of digits."""
-_EXACT = 2.0**53
-"""Largest number below which all whole numbers are exact in double precision."""
 
 
 def read_parameters(path: str | Path, model: type[T], what: str) -> T:
@@ -110,7 +108,7 @@ def _plain(value: Any, place: Place) -> Any:
     if isinstance(value, int) and value.bit_length() > MOST_BITS:
         reason = f"found a whole number of {value.bit_length():,} bits, expected {MOST_BITS:,}"
         raise ParameterError(place, f"{reason} at most")
-    if isinstance(value, float) and value.is_integer() and abs(value) < _EXACT:
+    if isinstance(value, float) and value.is_integer() and abs(value) < EXACT:
         return int(value)
     if value is not None and not isinstance(value, str | int | float):
         raise ParameterError(place, f"found {value!r}, expected a text, a number, a list or keys")

@@ -23,6 +23,10 @@ CONFIG: ConfigDict = {"extra": "forbid", "allow_inf_nan": False, "validate_defau
 """pydantic's settings for all parameters: no unknown keys, finite numbers, defaults as given."""
 
 
+EXACT = 2.0**53
+"""Largest number below which all whole numbers are exact in double precision."""
+
+
 class OneOf:
     """Marker in `Annotated[str, OneOf(*names)]` of a text that is one of several."""
 
@@ -58,15 +62,19 @@ class Check:
     """Marker in `Annotated[..., Check(function)]` of values that a function checks or converts.
 
     The function returns the value to take, and raises ValueError with the reason why there is none.
-    It is given what `Annotated` admits; with `before`, what was given.
+    It is given what `Annotated` admits; with `before`, what was given; `alone`, the annotation does
+    not count: it may be of arrays or functions.
     """
 
     function: Callable[[Any], Any]
     before: bool = False
+    alone: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, admit: GetCoreSchemaHandler) -> CoreSchema:
         from pydantic_core import core_schema
 
+        if self.alone:
+            return core_schema.no_info_plain_validator_function(self.function)
         if self.before:
             return core_schema.no_info_before_validator_function(self.function, admit(source))
         return core_schema.no_info_after_validator_function(self.function, admit(source))
@@ -109,7 +117,7 @@ def option(
 def parameters(cls: type[T]) -> type[T]:
     """Make a frozen dataclass whose values are checked against their annotations.
 
-    Numbers of NumPy become Python's, and lists become tuples, where these are annotated. A check of
+    Numbers of NumPy become Python's, and lists become tuples; a text is no number. A check of
     several values belongs in `__post_init__`, which raises ValueError with what is wrong; then the
     sentence begins with the place of the dataclass. Raises UserError on construction, with one
     sentence about the first value that is not admitted.
@@ -127,15 +135,44 @@ def parameters(cls: type[T]) -> type[T]:
 
         if len(values) > len(names):
             raise TypeError(f"{made.__name__} takes {len(names)} values, {len(values)} are given")
-        given = ArgsKwargs((), dict(zip(names, values)) | named)
+        given = {name: _plain(value) for name, value in (*zip(names, values), *named.items())}
         try:
-            adapter(made).validator.validate_python(given, self_instance=self)
+            validate = adapter(made).validator.validate_python
+            validate(ArgsKwargs((), given), strict=True, self_instance=self)
         except ValidationError as error:
             raise mistake_of(error, ValueDomain(made)) from None
 
     made.__init__ = construct
     made.__pydantic_config__ = CONFIG
     return made
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers as Python's, lists as tuples, and floats that are whole as whole numbers."""
+    value = value.item() if getattr(value, "shape", None) == () else value
+    if isinstance(value, list | tuple):
+        return tuple(map(_plain, value))
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    is_whole = isinstance(value, float) and value.is_integer() and abs(value) < EXACT
+    return int(value) if is_whole else value
+
+
+def checked(name: str, value: Any, annotation: Any) -> Any:
+    """A value of a call, if an annotation such as `Resolution` admits it, as `parameters` takes it.
+
+    Raises UserError if it does not, with a sentence that begins with `name`.
+    """
+    from pydantic import ValidationError
+
+    from carillon.parameters.fields import domain_of
+    from carillon.parameters.sentences import ParameterError, mistake_of
+
+    try:
+        return adapter(annotation).validate_python(_plain(value), strict=True)
+    except ValidationError as error:
+        mistake = mistake_of(error, domain_of(annotation))
+        raise ParameterError((name, *mistake.place), mistake.reason, mistake.meaning) from None
 
 
 @functools.cache

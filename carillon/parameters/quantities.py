@@ -84,6 +84,10 @@ Components = Annotated[
 ]
 Density = Annotated[float, between(*DENSITIES), "mass density [kg/m^3]"]
 PoissonRatio = Annotated[float, Within(gt=POISSON[0], lt=POISSON[1]), "Poisson's ratio [1]"]
+RayleighDamping = Annotated[
+    Pair[Annotated[float, between(0.0, 1e9)]],
+    "Rayleigh's coefficients of mass [1/s] and of stiffness [s]",
+]
 YoungsModulus = Annotated[float, between(*MODULI), "Young's modulus [Pa]"]
 Tolerance = Annotated[
     float, between(LEAST_TOLERANCE, 1.0), "relative error that double precision can reach"

@@ -58,6 +58,10 @@ class ParameterError(UserError):
         self.reason = reason
         self.meaning = meaning
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Ranks and processes send the sentence.
+        return UserError, self.args, vars(self)
+
 
 def mistake_of(
     error: ValidationError, domain: ValueDomain, in_yaml: bool = False

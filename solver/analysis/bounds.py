@@ -29,7 +29,7 @@ def check_mode_count(modes: int, n_dofs: int) -> None:
     if modes > n_dofs:
         raise UserError(
             f"{modes:,} modes asked for, but the model has {n_dofs:,} unknowns; ask for fewer or "
-            "raise --resolution"
+            "raise the resolution"
         )
 
 
@@ -45,7 +45,7 @@ def require_memory(model: Solid | None, options: SolverOptions, comm: MPI.Comm) 
         if free is not None and needed > free:
             raise UserError(
                 f"{vectors:,} modes of {n_dofs:,} unknowns take {needed / 1e9:,.1f} GB at least, "
-                f"{free / 1e9:,.1f} GB are free; ask for fewer modes or a lower --resolution"
+                f"{free / 1e9:,.1f} GB are free; ask for fewer modes or a lower resolution"
             )
 
     bcast_from_root(comm, check)

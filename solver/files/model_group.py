@@ -13,7 +13,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
-from carillon.fem.model import ElasticModel, Solid
+from carillon.fem.model import Damping, ElasticModel, Solid
 from carillon.fem.moduli import at_points
 from carillon.files.datasets import INTEGER, number, read, refused
 from carillon.limits import DENSITIES, EDGES, POISSON
@@ -41,6 +41,8 @@ def put_model(group: h5py.Group, model: Solid) -> None:
     put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
     group.attrs["poisson"] = model.poisson
     group.attrs["density"] = model.density
+    if model.damping is not None:
+        group.attrs["damping"] = model.damping
     group.attrs["cell_edge"] = mesh.edge
     group.attrs["origin"] = mesh.origin
     if mesh.span is not None and mesh.hanging is not None:
@@ -96,6 +98,7 @@ def get_model(group: h5py.Group) -> Solid:
         number(group, "density", *DENSITIES),
         bool(number(group, "lumped", 0.0, 1.0)),
         number(group, "lumped_share", 0.0, 1.0) if "lumped_share" in group.attrs else 0.0,
+        _damping(group),
     )
 
 
@@ -133,6 +136,7 @@ def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
         read(group, "young", (mesh.n_cells,)),
         number(group, "poisson", *POISSON),
         number(group, "density", *DENSITIES),
+        _damping(group),
     )
 
 
@@ -165,6 +169,15 @@ def _are_corners(mesh: HexMesh) -> bool:
     if mesh.kinds is not None:
         places = 2 * (mesh.grid[:, None, :] >> 1) + node_places()[mesh.kinds]
     return np.array_equal(mesh.node_grid[cells], places)
+
+
+def _damping(group: h5py.Group) -> Damping | None:
+    if "damping" not in group.attrs:
+        return None
+    pair = np.asarray(group.attrs["damping"])
+    if pair.shape != (2,) or pair.dtype.kind != "f" or not ((pair >= 0.0) & (pair < np.inf)).all():
+        raise refused(group, f"'damping' is {pair.tolist()}, expected two numbers of at least 0")
+    return float(pair[0]), float(pair[1])
 
 
 def _origin(group: h5py.Group) -> Array:

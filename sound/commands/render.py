@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
-from carillon.parameters.quantities import Number, Point, Positive, between
+from carillon.parameters.quantities import Number, Point, Positive, RayleighDamping, between
 from sound.bounds import (
     LARGEST_IMPULSE,
     LEAST_IMPULSE,
     LONGEST_SOUND,
+    ContactSeconds,
     SampleRate,
     require_length,
 )
@@ -25,15 +26,12 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.rendering.heard_solid import HeardSolid
     from sound.rendering.render import Hit
 
-LONGEST_CONTACT = 1.0
-"""Greatest duration of a strike's force [s]."""
 FULL = 0.99
 """Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""
 TOLD = 1e-3
 """Least share of the clips' energy in missed tones that is reported."""
 
 _Impulse = Annotated[float, between(-LARGEST_IMPULSE, LARGEST_IMPULSE)]
-_Coefficient = Annotated[float, between(0.0, 1e9)]
 
 
 @parameters
@@ -77,7 +75,7 @@ class RenderOptions:
     out: str = option(REQUIRED, "file to write (WAV)")
     seconds: Positive | None = option(None, "length (default: until it decays)")
     rate: SampleRate = option(44_100, "samples per second")
-    contact_seconds: Annotated[float, between(0.0, LONGEST_CONTACT)] = option(
+    contact_seconds: ContactSeconds = option(
         0.0,
         "duration of the force, half a sine (default 0: an impulse)",
     )
@@ -91,10 +89,10 @@ class RenderOptions:
         "for modes.h5 of a designed object: dampings, points, loudness, noise of a design",
         metavar="DESIGN",
     )
-    damping: tuple[_Coefficient, _Coefficient] | None = option(
+    damping: RayleighDamping | None = option(
         None,
         "for modes.h5: Rayleigh damping, coefficients of mass [1/s] and stiffness [s] "
-        "(default 30 1e-6)",
+        "(default: that of the solid if its file tells, or 30 1e-6)",
         metavar=("ALPHA", "BETA"),
     )
     json: bool = option(False, "print what sounds as JSON")

@@ -63,9 +63,9 @@ def open_heard_solid(
     """The solid of a file, a design or modes of the solver, as it is heard.
 
     Modes of a designed object are heard `like` that design, other ones with Rayleigh's `damping`
-    coefficients of mass [1/s] and stiffness [s]; `Design.damped_by` has the sources that dampings
-    of a design come from.  Raises UserError if a file is unusable, or what is given does not go
-    with its kind.
+    coefficients of mass [1/s] and stiffness [s], by default those in the file; `Design.damped_by`
+    has the sources that dampings of a design come from.  Raises UserError if a file is unusable, or
+    what is given does not go with its kind.
     """
     has_modes = kind_of(file, "a Carillon design or modes file (HDF5)")[0] == "modes"
     if not has_modes and (damping or like):
@@ -75,14 +75,15 @@ def open_heard_solid(
     if has_modes and not like:
         if damping_from:
             raise UserError("--damping-from goes with a design; modes.h5 takes --damping")
-        return heard_modes(read_modes(file), Damping(*damping) if damping else Damping())
+        return heard_modes(read_modes(file), damping)
     design = read_design(like or file).damped_by(damping_from)
     return heard_design(design, read_modes(file) if has_modes else None)
 
 
-def heard_modes(file: ModesFile, damping: Damping) -> HeardSolid:
-    """The solid of any modes file, with Rayleigh damping."""
-    return HeardSolid(SoundingSolid.of_modes(file, damping), None, _places_of_model(file.model))
+def heard_modes(file: ModesFile, damping: Sequence[float] | None = None) -> HeardSolid:
+    """The solid of any modes file, with Rayleigh damping: that given, its own, or the default."""
+    rayleigh = Damping(*(damping or file.model.damping or ()))
+    return HeardSolid(SoundingSolid.of_modes(file, rayleigh), None, _places_of_model(file.model))
 
 
 def heard_design(design: Design, truth: ModesFile | None = None) -> HeardSolid:
@@ -144,7 +145,7 @@ def _places_of_model(model: Solid) -> Places:
             if point.at is None:
                 raise UserError(
                     f"{name}: a modes file knows neither targets nor the vertices of a surface; "
-                    "strike it --at a point, or name its design by --like"
+                    "strike it at a point, or name its design (--like)"
                 )
             position, inward = surface.place(np.array(point.at), name, reach)
             struck.append((position, inward, float(np.linalg.norm(position - point.at))))

@@ -200,11 +200,8 @@ def body_of(entry: ObjectEntry) -> Body:
 
 
 def _in_keys(sentence: str) -> str:
-    """A sentence about options of commands, with keys of a scene in place of the options."""
-    keys = {"--resolution": "resolution", "--components largest": "components: largest"}
-    for option, key in keys.items():
-        sentence = sentence.replace(option, key)
-    return sentence
+    """A sentence about an option of commands, with the key of a scene in its place."""
+    return sentence.replace("--components largest", "components: largest")
 
 
 def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:

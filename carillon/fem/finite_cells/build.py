@@ -137,7 +137,8 @@ def _unseen(surface: Surface, share: float, resolution: int, grid: Grid, name: s
     remedy = f"to {better}" if better else "or turn the solid"
     return (
         f"mesh {name!r} at resolution {resolution} is so thin that lines of the lattice, whose "
-        f"spacing is {grid.edge:.3g} m, find {share:.0%} of its volume; raise --resolution {remedy}"
+        f"spacing is {grid.edge:.3g} m, find {share:.0%} of its volume; raise the resolution "
+        f"{remedy}"
     )
 
 
@@ -152,7 +153,7 @@ def _lost(surface: Surface, inside: Inside, resolution: int, grid: Grid, name: s
     remedy = f"to {better}" if better else "or make them thicker"
     return (
         f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which are "
-        f"lost between its lines; raise --resolution {remedy}"
+        f"lost between its lines; raise the resolution {remedy}"
     )
 
 
@@ -161,10 +162,10 @@ def _in_pieces(surface: Surface, volumes: np.ndarray, resolution: int, name: str
     # A piece for each closed shell: these are apart, and no lattice joins them.
     apart = 1 < surface.body_count <= len(volumes)
     better = None if apart else _better_resolution(surface, resolution, _is_one_piece, PIECES_GRID)
-    remedy = f"raise --resolution to {better}, where it is one" if better else "join them"
+    remedy = f"raise the resolution to {better}, where it is one" if better else "join them"
     return (
         f"mesh {name!r} at resolution {resolution} is in {len(volumes):,} pieces ({listed} voxels "
-        f"the largest); {remedy}, or pass --components largest to keep the largest"
+        f"the largest); {remedy}, or keep the largest alone (--components largest)"
     )
 
 

@@ -85,7 +85,7 @@ class Covering:
         sizes = np.bincount(piece, parts.volumes[own])
         if np.count_nonzero(sizes >= SMALLEST_PIECE) > 1:
             raise UserError(
-                f"mesh {self.name!r} falls apart where cells are divided; raise --resolution, or "
+                f"mesh {self.name!r} falls apart where cells are divided; raise the resolution, or "
                 "join its parts"
             )
         chosen = np.zeros(len(leaves), dtype=bool)

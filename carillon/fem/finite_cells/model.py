@@ -15,7 +15,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.hanging import at_nodes, node_places, node_weights
 from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import DEFAULT_DENSITY, Solid
+from carillon.fem.model import DEFAULT_DENSITY, Damping, Solid
 from carillon.fem.moduli import require_moduli
 
 
@@ -95,6 +95,7 @@ class FiniteCellModel(Solid):
     `finite_cell_model` and `with_young`."""
     poisson: float = DEFAULT_POISSON
     density: float = DEFAULT_DENSITY
+    damping: Damping | None = None
     """See `Solid`."""
 
     @property
@@ -143,6 +144,7 @@ def finite_cell_model(
     young: Array,
     poisson: float = DEFAULT_POISSON,
     density: float = DEFAULT_DENSITY,
+    damping: Damping | None = None,
 ) -> FiniteCellModel:
     """Solid of finite cells with moduli `young` (m,) [Pa] of the voxels.
 
@@ -158,4 +160,4 @@ def finite_cell_model(
     (945, 3.0)
     """
     given = require_moduli(young, cells.mesh.n_cells, points=False)
-    return FiniteCellModel(cells, given, poisson, density)
+    return FiniteCellModel(cells, given, poisson, density, damping)

@@ -33,7 +33,7 @@ def say_bridged(surface: Surface, voxels: VoxelModel) -> None:
         at = ", ".join(f"{x:.3g}" for x in joint)
         warn_once(
             f"mesh {voxels.name!r}: voxels close a gap near ({at}) m and hold together what is "
-            "apart; raise --resolution, or use --discretisation finite-cell"
+            "apart; raise the resolution, or use --discretisation finite-cell"
         )
 
 

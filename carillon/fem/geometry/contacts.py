@@ -82,8 +82,8 @@ def _without_others(surface: Surface, facets: Facets, components: str, name: str
     if components == "error":
         raise UserError(
             f"mesh {name!r} falls into {body.max() + 1} pieces that touch along an edge or in a "
-            "point at most, where nothing holds them together; let them overlap, or pass "
-            "--components largest to keep the largest"
+            "point at most, where nothing holds them together; let them overlap, or keep the "
+            "largest alone (--components largest)"
         )
     volumes = np.bincount(body, [part.volume for part in outer])
     largest = int(volumes.argmax())

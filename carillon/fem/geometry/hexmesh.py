@@ -57,6 +57,7 @@ class HexMesh:
 
     @property
     def n_nodes(self) -> int:
+        """Number of nodes."""
         return len(self.node_grid)
 
     @property
@@ -66,6 +67,7 @@ class HexMesh:
 
     @property
     def n_cells(self) -> int:
+        """Number of cells."""
         return len(self.cells)
 
     @property

@@ -79,10 +79,10 @@ def surface_of_triangles(vertices: ArrayLike, faces: ArrayLike, name: str) -> tr
     Raises UserError if arrays have other shapes or faces name vertices that are not there, and for
     what `load_surface` refuses of coordinates and faces.
     """
-    surface = trimesh.Trimesh(np.asarray(vertices), np.asarray(faces), process=False)
     try:
+        surface = trimesh.Trimesh(np.asarray(vertices), np.asarray(faces), process=False)
         _require_vertices(surface)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise UserError(f"{name}: {error}") from None
     if not len(surface.faces):
         raise UserError(f"{name}: has no faces, expected the triangles of a surface")

@@ -105,8 +105,8 @@ def voxelize(
     if model.n_cells == 0:
         raise UserError(
             f"mesh {name!r} at resolution {resolution} fills no voxel: its walls are thinner than "
-            f"a voxel of {model.edge:.3g} m, or it encloses nothing; raise --resolution or repair "
-            f"the mesh"
+            f"a voxel of {model.edge:.3g} m, or it encloses nothing; raise the resolution or "
+            "repair the mesh"
         )
     labels, sizes = label_pieces(model.filled)
     if len(sizes) > 1 and components == "error":
@@ -125,7 +125,7 @@ def checked_resolution(surface: Surface, resolution: int, name: str) -> int:
         checked = 0
     if checked < 2 or isinstance(resolution, bool):
         raise UserError(
-            f"resolution {resolution}: expected a whole number of at least 2 voxels along the "
+            f"resolution {resolution!r}: expected a whole number of at least 2 voxels along the "
             f"longest side"
         )
     extents = np.ptp(surface.bounds, axis=0)
@@ -164,8 +164,8 @@ def _pieces_message(surface: Surface, model: VoxelModel, fill: str, sizes: np.nd
     hint = f" (at {better} it is one piece)" if better else ""
     return (
         f"mesh {model.name!r} at resolution {model.resolution} falls into {len(sizes):,} pieces "
-        f"({listed} voxels); raise --resolution{hint} or pass "
-        "--components largest to keep the largest"
+        f"({listed} voxels); raise the resolution{hint} or keep the largest alone "
+        "(--components largest)"
     )
 
 
