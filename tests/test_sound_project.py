@@ -286,5 +286,5 @@ def test_settings_from_elsewhere_keep_to_the_schema(folder):
 def test_a_missing_project_is_answered_in_one_sentence(folder):
     with pytest.raises(UserError, match="no such file, expected a project"):
         load_project(folder / "none.yaml")
-    with pytest.raises(UserError, match="no such file, expected a project"):
+    with pytest.raises(UserError, match="is a folder, expected a project"):
         load_project(folder)
