@@ -135,6 +135,19 @@ def read_modes(path: str | Path, with_modes: bool = True) -> ModesFile:
 
     Raises UserError if the file is missing, damaged, of another schema, or inconsistent: everything
     in it is a finite number, eigenvalues ascend, and the parts fit each other.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from carillon.fem.geometry import hexmesh_from_grid
+    >>> from carillon.fem.model import fine_model
+    >>> cube = hexmesh_from_grid(np.zeros((1, 3), int), np.zeros(3), 1.0)
+    >>> solid, rigid = fine_model(cube, np.ones(1)), np.tile([[1.0], [0.0], [0.0]], (8, 1))
+    >>> with TemporaryDirectory() as folder:
+    ...     path = f"{folder}/modes.h5"
+    ...     write_modes(path, solid, np.zeros(1), [rigid], np.zeros(1), {}, {})
+    ...     read_modes(path).frequencies.tolist()
+    [0.0]
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
         attributes = {key: _plain(value) for key, value in file.attrs.items()}
