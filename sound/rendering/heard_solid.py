@@ -145,7 +145,7 @@ def _places_of_model(model: Solid) -> Places:
             if point.at is None:
                 raise UserError(
                     f"{name}: a modes file knows neither targets nor the vertices of a surface; "
-                    "strike it at a point, or name its design (--like)"
+                    "strike it at a point (--at), or name its design (--like)"
                 )
             position, inward = surface.place(np.array(point.at), name, reach)
             struck.append((position, inward, float(np.linalg.norm(position - point.at))))

@@ -181,7 +181,7 @@ each(
 )
 CELLS = "--resolution 8 --modes 12 --discretisation finite-cell --out out.h5"
 hostile("cells of a sheet", f"modes ZOO/triangle.obj {CELLS}", "encloses nothing")
-hostile("cells of a needle", f"modes ZOO/needle.obj {CELLS}", "thinner", "--resolution")
+hostile("cells of a needle", f"modes ZOO/needle.obj {CELLS}", "thinner", "resolution to")
 hostile("cells that are apart", f"modes ZOO/apart.obj {CELLS}", "pieces", "--components")
 hostile("cells of no thickness", f"modes ZOO/flat.obj {CELLS}", "is flat")
 hostile(
