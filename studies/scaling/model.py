@@ -6,7 +6,7 @@ Operations are counted, see `studies.scaling.work`; the rates are those of the m
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,8 @@ ASSUMPTIONS = (
     "phases follow each other, and so do the levels of the merge tree: who has less to do waits",
     "the rate of a kind of phase is the same for all sizes: small matrices cost no more per "
     "operation than large ones",
-    "subdomains are compact, equally large, dealt evenly and joined in pairs; ranks that have no "
-    "merge of their own share those of others",
+    "subdomains and merges are dealt and shared as the solver deals them; the operations of each "
+    "are those of a compact group of so many nodes and modes",
     f"an eigenproblem shared by ranks takes {SHARED_COST:g} times as many operations, as on two "
     f"ranks here, evenly divided, and {SENT_A_COLUMN} messages a column and direction of the grid",
     "factorisation and solves are those of a compact solid and divide evenly over the ranks; their "
@@ -37,6 +37,9 @@ ASSUMPTIONS = (
     "partition and elimination plan are not in it: they are made once for any material",
 )
 """Assumptions of the model."""
+WEAK_ASSUMPTIONS = ("the subdomains of a solid that grows are equally large and joined in pairs",)
+"""Assumptions where the solid grows with the ranks."""
+
 Run = dict[str, Any]
 Row = dict[str, Any]
 
@@ -60,6 +63,10 @@ class MachineRates:
             + each.messages * self.latency
             for phase, each in work.items()
         }
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain dictionary, ready for JSON."""
+        return asdict(self)
 
 
 def kind(phase: str) -> str:
@@ -86,17 +93,19 @@ def fit_machine(
     for run, work in fair:
         for phase, tally in work.items():
             flops[kind(phase)] += tally.flops
-        for phase, measured in run["phases"].items():
-            if kind(phase) in seconds:
-                seconds[kind(phase)] += _busy(measured)
+            seconds[kind(phase)] += _busy(run["phases"][phase])
     rates = {
         name: flops[name] / seconds[name] if flops[name] > 0.0 else np.inf for name in MODELLED
     }
     links = [run["link"] for run, _ in fair if run["link"] is not None]
-    link = {"latency": ASSUMED_LATENCY, "bandwidth": ASSUMED_BANDWIDTH}
+    measured = {"latency": ASSUMED_LATENCY, "bandwidth": ASSUMED_BANDWIDTH}
     if links:
-        link = {name: float(np.median([each[name] for each in links])) for name in link}
-    return MachineRates(rates, latency or link["latency"], bandwidth or link["bandwidth"])
+        measured = {name: float(np.median([link[name] for link in links])) for name in measured}
+    return MachineRates(
+        rates,
+        measured["latency"] if latency is None else latency,
+        measured["bandwidth"] if bandwidth is None else bandwidth,
+    )
 
 
 def as_far_as_it_fits(runs: Sequence[Run], rows: Sequence[Row]) -> dict[str, Any]:

@@ -2,22 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from math import log2
 from typing import Annotated, Any
 
+from carillon.fem.model import Solid
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import NumberOfModes, Tolerance, between
 from solver import linear
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.correction.criteria import INTERACTIVE_TOLERANCE
+from solver.distribution.decomposition import decompose
+from solver.distribution.tree import MergeTree
 from studies.scaling.launch import MOST_RANKS, measure_each, require_ranks
 from studies.scaling.model import (
     ASSUMPTIONS,
+    WEAK_ASSUMPTIONS,
     MachineRates,
     as_far_as_it_fits,
     fit_machine,
 )
-from studies.scaling.work import Work, busiest
+from studies.scaling.work import Request, balanced_tree, busiest
 
 PREDICTED = tuple(1 << power for power in range(11))
 """Numbers of ranks that the model is asked for: 1 to 1024."""
@@ -26,6 +31,10 @@ FEWEST_CELLS = 4
 NOTE = "A model, not a measurement; see its assumptions and how far it is from the measurements."
 
 Result = dict[str, Any]
+Tree = tuple[MergeTree, list[float]]
+"""A merge tree and the nodes of its groups."""
+
+
 RankCount = Annotated[int, between(1, MOST_RANKS)]
 """A number of ranks."""
 
@@ -66,15 +75,18 @@ def scaling_study(
 
     Raises UserError for anything wrong with the solid, or if all runs fail.
 
-    Returns plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was
-    said by those that `failed`, and `model`.
-
     Parameters
     ----------
     options
         The solid.
     arguments
         Command-line arguments of a run, without mesh and resolution.
+
+    Returns
+    -------
+    Result
+        Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said
+        by those that `failed`, and `model`.
     """
     require_ranks(max(scaling.ranks))
     problem = build_problem(options)
@@ -88,42 +100,67 @@ def scaling_study(
         )
 
     strong, failed = runs(dict.fromkeys(scaling.ranks, options.resolution))
-    most = len(problem.model.connectivity) // FEWEST_CELLS
+    model, most = problem.model, len(problem.model.connectivity) // FEWEST_CELLS
     asked = {*PREDICTED, *(run["ranks"] for run in strong)}
-    first = strong[0]
-    sizes = {
-        ranks: (first["n_dofs"], max(first["subdomains"], ranks))
-        for ranks in sorted(asked)
-        if ranks <= most
-    }
-    fitted = [(run, _work_of(run)) for run in strong if run["ranks"] in sizes]
-    machine = fit_machine(fitted, scaling.latency, scaling.bandwidth)
+    trees = trees_of_solid(model, sorted(n for n in asked if n <= most), options.seed)
+    request = Request.of_run(strong[0])
+    work = {ranks: busiest(*tree, request, ranks) for ranks, tree in trees.items()}
+    machine = fit_machine(
+        [(run, work[run["ranks"]]) for run in strong if run["ranks"] in work],
+        scaling.latency,
+        scaling.bandwidth,
+    )
     result: Result = {
         "mesh": options.mesh,
         "resolution": options.resolution,
         "options": asdict(scaling),
-        "machine": asdict(machine),
-        "strong": {"runs": strong, "failed": failed, "model": _modelled(machine, strong, sizes)},
+        "machine": machine.as_dict(),
+        "strong": {
+            "runs": strong,
+            "failed": failed,
+            "model": _modelled(machine, strong, trees, request, ASSUMPTIONS),
+        },
         "weak": None,
     }
     if scaling.weak:
         grown = {ranks: round(options.resolution * ranks ** (1 / 3)) for ranks in scaling.ranks}
         weak, failed = runs(grown)
-        of_rank = [weak[0][name] / weak[0]["ranks"] for name in ("n_dofs", "subdomains")]
-        sizes = {
-            ranks: (round(ranks * of_rank[0]), max(ranks, round(ranks * of_rank[1])))
-            for ranks in PREDICTED
-        }
         result["weak"] = {
             "runs": weak,
             "failed": failed,
-            "model": _modelled(machine, weak, sizes),
+            "model": _modelled(
+                machine,
+                weak,
+                growing_trees(weak[0]),
+                Request.of_run(weak[0]),
+                ASSUMPTIONS + WEAK_ASSUMPTIONS,
+            ),
         }
     return result
 
 
-def _work_of(run: Result) -> Work:
-    return busiest(run["n_dofs"], run["subdomains"], run, run["ranks"])
+def trees_of_solid(model: Solid, ranks: Sequence[int], seed: int) -> dict[int, Tree]:
+    """Merge tree of a solid and the nodes of its groups, for each of ascending numbers of ranks."""
+    trees: dict[int, Tree] = {}
+    last: Tree | None = None
+    for count in ranks:
+        if last is None or count > last[0].parts:
+            decomposition, _ = decompose(model, None, seed, count)
+            nodes = [float(stop - start) for start, stop in decomposition.row_ranges()]
+            last = decomposition.tree, nodes
+        trees[count] = last
+    return trees
+
+
+def growing_trees(run: Result) -> dict[int, Tree]:
+    """The same of solids that grow with the ranks, with the unknowns of a rank of this run."""
+    nodes = run["n_dofs"] / run["ranks"] / 3.0
+    levels = max(0, round(log2(run["subdomains"] / run["ranks"])))
+    trees = {}
+    for ranks in PREDICTED:
+        tree = balanced_tree(levels + round(log2(ranks)))
+        trees[ranks] = tree, [nodes / (1 << levels) * (1 << level) for level in tree.levels()]
+    return trees
 
 
 def study_lines(result: Result) -> list[str]:
@@ -155,13 +192,22 @@ def study_lines(result: Result) -> list[str]:
 
 
 def _modelled(
-    machine: MachineRates, runs: list[Result], sizes: dict[int, tuple[int, int]]
+    machine: MachineRates,
+    runs: list[Result],
+    trees: dict[int, Tree],
+    request: Request,
+    assumptions: Sequence[str],
 ) -> Result:
-    """The model of some runs for numbers of ranks with so many unknowns and subdomains."""
     rows = []
-    for ranks, (unknowns, subdomains) in sizes.items():
-        work = busiest(unknowns, subdomains, runs[0], ranks)
-        seconds = machine.predict(work)
-        row = {"ranks": ranks, "n_dofs": unknowns, "subdomains": subdomains}
-        rows.append(row | {"seconds": seconds, "total": sum(seconds.values())})
-    return {"note": NOTE, "assumptions": list(ASSUMPTIONS), **as_far_as_it_fits(runs, rows)}
+    for ranks, (tree, nodes) in trees.items():
+        seconds = machine.predict(busiest(tree, nodes, request, ranks))
+        rows.append(
+            {
+                "ranks": ranks,
+                "n_dofs": round(3.0 * nodes[-1]),
+                "subdomains": tree.parts,
+                "seconds": seconds,
+                "total": sum(seconds.values()),
+            }
+        )
+    return {"note": NOTE, "assumptions": list(assumptions), **as_far_as_it_fits(runs, rows)}

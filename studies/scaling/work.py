@@ -1,15 +1,21 @@
 """Operations, bytes and messages of the busiest rank in every phase, counted without doing them.
 
-All of it are closed forms of compact solids: subdomains are equally large and joined in pairs, a
-group of n nodes has 6 n^(2/3) on its boundary, and nested dissection starts with a separator of
-s = 3 n^(2/3) unknowns, so that a factorisation takes about 4 s^3 operations and its factor has
-2 s^2 entries.
+They follow from the nodes of the groups of a merge tree, from the solver's own schedule of merges,
+and from closed forms for compact solids: a group of n nodes has 6 n^(2/3) on its boundary, and
+nested dissection starts with a separator of s = 3 n^(2/3) unknowns, so that a factorisation takes
+about 4 s^3 operations and its factor has 2 s^2 entries.
 """
 
-from collections.abc import Mapping
-from math import ceil
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from solver.distribution.decomposition import COST_EXPONENT
+from solver.distribution.tree import Merge, MergeTree, assign_ranks
 from solver.hcms.counts import (
     Tally,
     count_shared_eigenproblem,
@@ -17,7 +23,7 @@ from solver.hcms.counts import (
     krylov_flops,
     product_flops,
 )
-from solver.hcms.schedule import modes_to_keep
+from solver.hcms.schedule import planned_modes, schedule
 from solver.hcms.synthesis import local_steps
 
 REAL_BYTES = 8
@@ -29,71 +35,114 @@ DENSE_PROBLEMS = 3
 Work = dict[str, Tally]
 
 
-def busiest(unknowns: float, subdomains: int, run: Mapping[str, Any], ranks: int) -> Work:
+@dataclass(frozen=True)
+class Request:
+    """What is computed, on any number of ranks."""
+
+    keep: int
+    """Modes kept at the root of the merge tree."""
+    blocks: int
+    solves: int
+    """Blocks of right-hand sides of the correction, and their columns in all."""
+    width: int
+    """Modes that it forms."""
+
+    @classmethod
+    def of_run(cls, run: dict[str, Any]) -> Request:
+        """That of a measured run."""
+        return cls(run["keep"], run["blocks"], run["right_hand_sides"], run["width"])
+
+
+def busiest(tree: MergeTree, nodes: Sequence[float], request: Request, ranks: int) -> Work:
     """Work of the busiest rank in every phase, as tallies without times.
 
-    A measured `run` says what is computed on any number of ranks: modes that the root of the merge
-    tree may `keep`, `blocks` of `right_hand_sides` of the correction, its `width` in modes.
+    `nodes`: (groups,) nodes of every group of `tree`.
     """
-    leaf, mine = unknowns / subdomains, ceil(subdomains / ranks)
-    modes = [min(modes_to_keep(1.0 / subdomains, run["keep"]), int(leaf))]
-    down, merges = Tally(), {}
-    for level in range(1, (subdomains - 1).bit_length() + 1):
-        groups = max(1.0, subdomains / 2**level)
-        root, size = groups == 1.0, 2 * modes[-1]
-        child, joined = min(leaf * 2 ** (level - 1), unknowns), min(leaf * 2**level, unknowns)
-        modes.append(min(modes_to_keep(1.0 / groups, run["keep"]), size))
-        # Several ranks share a merge, or one has several of them.
-        team, each = max(1, int(ranks / groups)), max(1.0, groups / ranks)
-        merge = Tally(flops=each * _products(joined, size, 0 if root else modes[-1]) / team)
-        if team == 1:
-            merge.flops += each * eigen_flops(size, True)
-        else:
-            count_shared_eigenproblem(merge, size, True, team)
-            merge.messages += MERGE_MESSAGES
-            merge.bytes += REAL_BYTES * modes[-2] * (min(child, _boundary(child)) + size)
-            down.messages += 2
-            down.bytes += REAL_BYTES * modes[-2] * run["keep"]
-        if not root:
-            down.flops += each * 2.0 * product_flops(modes[-2], modes[-1], run["keep"])
-        merges[f"merge {level}"] = merge
-    down.messages += 2 * (ranks - 1)
-    down.bytes += REAL_BYTES * (ranks - 1) * (1 + modes[-1])
-    krylov = krylov_flops(int(leaf), modes[0], local_steps(subdomains))
+    unknowns = 3.0 * np.asarray(nodes)
+    owner = assign_ranks(np.asarray(nodes[: tree.parts]) ** COST_EXPONENT, ranks)
+    modes = planned_modes(tree, nodes, request.keep)
+    steps = local_steps(tree.parts)
+    local, basis, own = np.zeros((3, ranks))
+    for part, rank in enumerate(owner):
+        own[rank] += unknowns[part]
+        local[rank] += krylov_flops(int(unknowns[part]), modes[part], steps)
+        basis[rank] += product_flops(int(unknowns[part]), modes[part], modes[-1])
+    largest = float(own.max())
     return {
-        "assembly": Tally(flops=mine * leaf),
-        "local": Tally(flops=mine * krylov),
-        **merges,
-        "down": down,
-        "basis": Tally(flops=mine * product_flops(int(leaf), modes[0], modes[-1]) if merges else 0),
-        **_correction(unknowns, mine * leaf, run, ranks),
+        "assembly": Tally(flops=largest),
+        "local": Tally(flops=float(local.max())),
+        **_synthesis(tree, nodes, modes, owner, request.keep, ranks),
+        "basis": Tally(flops=float(basis.max()) if tree.merges else 0.0),
+        **_correction(float(unknowns[-1]), largest, request, ranks),
     }
 
 
-def _products(unknowns: float, size: int, joined: int) -> float:
+def balanced_tree(levels: int) -> MergeTree:
+    """Merge tree of 2^levels subdomains, joined in pairs."""
+    parts = 1 << levels
+    merges = [Merge(parts + i, 2 * i, 2 * i + 1) for i in range(parts - 1)]
+    return MergeTree(parts, tuple(merges))
+
+
+def _synthesis(
+    tree: MergeTree, nodes: Sequence[float], modes: list[int], owner: Any, keep: int, ranks: int
+) -> Work:
+    """Work of the merges, level by level, and of the coefficients on their way back."""
+    plan, levels = schedule(tree, owner, nodes, keep), tree.levels()
+    phases = {f"merge {level}": _tallies(ranks) for level in range(1, levels[-1] + 1)}
+    down = _tallies(ranks)
+    for step, team, crews in zip(tree.merges, plan.teams, plan.crews, strict=True):
+        merge = phases[f"merge {levels[step.group]}"]
+        here, size = plan.holder[step.group], modes[step.left] + modes[step.right]
+        products = _product_flops(nodes, modes, step, root=step.group == len(nodes) - 1)
+        merge[here].flops += products / (1 + len(crews[0]) + len(crews[1]))
+        for rank in team:
+            if len(team) == 1:
+                merge[rank].flops += eigen_flops(size, True)
+            else:
+                count_shared_eigenproblem(merge[rank], size, True, len(team))
+        for child in (step.left, step.right):
+            there = plan.holder[child]
+            if step.group < len(nodes) - 1:
+                down[here].flops += product_flops(modes[child], modes[step.group], modes[-1])
+            if there != here:
+                rows = min(3.0 * nodes[child], 3.0 * _boundary(nodes[child]))
+                merge[there].messages += MERGE_MESSAGES
+                merge[there].bytes += REAL_BYTES * modes[child] * (rows + size)
+                down[here].messages += 2
+                down[here].bytes += REAL_BYTES * modes[child] * modes[-1]
+    down[plan.holder[-1]].messages += 2 * (ranks - 1)
+    down[plan.holder[-1]].bytes += REAL_BYTES * (ranks - 1) * (1 + modes[-1])
+    return {name: _largest(tallies) for name, tallies in {**phases, "down": down}.items()}
+
+
+def _product_flops(nodes: Sequence[float], modes: list[int], step: Merge, root: bool) -> float:
     """Products of a merge: at the face where two compact groups meet, and for the joined boundary.
 
-    The stiffness at the face is projected on the modes of either group and on both, `size` in all;
-    but for the root, the joined modes are formed on the boundary.
+    The stiffness at the face is projected on the modes of either group and on both; but for the
+    root, the joined modes are formed on the boundary.
     """
-    face = 3.0 * (unknowns / 3.0) ** (2.0 / 3.0)
-    return 1.5 * face * size**2 + _boundary(unknowns) * size * joined
+    left, right, joined = (modes[group] for group in (step.left, step.right, step.group))
+    face = 3.0 * nodes[step.group] ** (2.0 / 3.0)
+    boundary = 0.0 if root else 3.0 * _boundary(nodes[step.group])
+    projected = 2.0 * face * (left**2 + right**2 + left * right)
+    return projected + boundary * (left + right) * joined
 
 
-def _correction(unknowns: float, largest: float, run: Mapping[str, Any], ranks: int) -> Work:
+def _correction(unknowns: float, largest: float, request: Request, ranks: int) -> Work:
     """Work of the block Lanczos iteration, where the busiest rank has `largest` of the unknowns.
 
     The ranks share factorisation, solves, the projection of every block on all before it and the
     modes; the dense problems of the Krylov space are the first rank's.
     """
-    blocks, solves = run["blocks"], run["right_hand_sides"]
+    blocks, solves = request.blocks, request.solves
     columns = solves / max(blocks, 1)
     rounds = (ranks - 1).bit_length()
     separator = 3.0 * (unknowns / 3.0) ** (2.0 / 3.0)
     fronts = [separator * 0.5 ** (2.0 * level / 3.0) for level in range(rounds)]
-    shared = 2.0 * solves**2 + 6.0 * columns * solves + 2.0 * solves * run["width"]
+    shared = 2.0 * solves**2 + 6.0 * columns * solves + 2.0 * solves * request.width
     alone = DENSE_PROBLEMS * eigen_flops(solves, False)
-    outside = _boundary(largest) if ranks > 1 else 0.0
+    outside = 3.0 * _boundary(largest / 3.0) if ranks > 1 else 0.0
     reduced = rounds * solves * (0.5 * solves + 2.0 * columns)
     return {
         "factor": Tally(
@@ -114,6 +163,18 @@ def _correction(unknowns: float, largest: float, run: Mapping[str, Any], ranks: 
     }
 
 
-def _boundary(unknowns: float) -> float:
-    """Unknowns on the boundary of a compact group."""
-    return 18.0 * (unknowns / 3.0) ** (2.0 / 3.0)
+def _boundary(nodes: float) -> float:
+    """Nodes on the boundary of a compact group."""
+    return 6.0 * nodes ** (2.0 / 3.0)
+
+
+def _tallies(ranks: int) -> list[Tally]:
+    return [Tally() for _ in range(ranks)]
+
+
+def _largest(tallies: list[Tally]) -> Tally:
+    return Tally(
+        max(each.messages for each in tallies),
+        max(each.bytes for each in tallies),
+        max(each.flops for each in tallies),
+    )
