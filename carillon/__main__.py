@@ -34,8 +34,8 @@ def commands() -> dict[str, Command]:
 
 def studies() -> dict[str, Command]:
     """Commands of the studies by name."""
-    found: dict[str, Command] = import_module("studies").commands()
-    return found
+    commands: dict[str, Command] = import_module("studies").commands()
+    return commands
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -41,10 +41,10 @@ def _others(config: Mapping[str, Any], meshes: Iterable[str]) -> Iterator[str]:
         pinned = PINNED.get(path.name)
         if pinned is None or not path.is_file():
             continue
-        found = hashlib.sha256(path.read_bytes()).hexdigest()
-        if found != pinned["sha256"]:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        if digest != pinned["sha256"]:
             yield (
                 f"{path} is another file than the one that kept tables rest on (SHA-256 "
-                f"{found[:SHOWN]}…, expected {pinned['sha256'][:SHOWN]}…; {pinned['source']}): "
+                f"{digest[:SHOWN]}…, expected {pinned['sha256'][:SHOWN]}…; {pinned['source']}): "
                 "figures of it do not compare with theirs."
             )

@@ -67,16 +67,16 @@ def _mistakes_in_lines(files: Iterable[str | Path], given: Values) -> Iterator[N
 
 def _where(place: Place, files: Iterable[str | Path], given: Values) -> str:
     """Beginning of a sentence: where the value at a place was written last."""
-    found = [(0, "")]
+    places = [(0, "")]
     for file in files:
         steps, line = nearest(read_marked(file, CONFIGURATION)[1], place)
-        found.append((steps, f"{file}, line {line}: "))
+        places.append((steps, f"{file}, line {line}: "))
     steps, part = 0, cast("Any", given)
     while steps < len(place) and isinstance(part, Mapping) and place[steps] in part:
         steps, part = steps + 1, part[place[steps]]
     if steps:
-        found.append((steps, "--config: "))
-    return sorted(found, key=lambda each: each[0])[-1][1]
+        places.append((steps, "--config: "))
+    return sorted(places, key=lambda each: each[0])[-1][1]
 
 
 def resolved(config: Mapping[str, Any]) -> dict[str, Any]:

@@ -145,10 +145,10 @@ def main(words: list[str]) -> int:
                 workdir=Path(configfile).parent,
             )
             triggers = types.RerunTrigger.parse_choices_set(profile["rerun-triggers"])
-            wanted = types.DAGSettings(
+            requested = types.DAGSettings(
                 targets={target}, force_incomplete=True, rerun_triggers=triggers
             )
-            rules.dag(wanted).execute_workflow()
+            rules.dag(requested).execute_workflow()
         except Exception as error:
             events.tell(error=reason(list(report), events.failed, error))
             api.print_exception(error)

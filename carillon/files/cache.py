@@ -52,17 +52,17 @@ def remembered(
             kept = read(path)
             os.utime(path)
             return kept
-    found = find()
+    result = find()
     if folder.is_absolute():  # else the user has no home
         with suppress(UserError, OSError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if not is_own(folder.lstat(), stat.S_ISDIR):
-                return found
+                return result
             folder.chmod(0o700)
-            write(path, found)
+            write(path, result)
             path.chmod(0o600)  # whatever the user lets others do with other files
             _make_room(folder)
-    return found
+    return result
 
 
 def folder_of(kind: str) -> Path:

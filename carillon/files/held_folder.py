@@ -55,10 +55,10 @@ class HeldFolder:
                 f"{self.path / name}: is a {kind_of_mode(mode)}, expected a folder; remove it"
             )
         flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-        found = HeldFolder.__new__(HeldFolder)
-        found.path = self.path / name
-        found._folder = os.open(name, flags, dir_fd=self._folder)
-        return found
+        folder = HeldFolder.__new__(HeldFolder)
+        folder.path = self.path / name
+        folder._folder = os.open(name, flags, dir_fd=self._folder)
+        return folder
 
     def names(self) -> list[str]:
         """Names of all that is in it."""

@@ -74,9 +74,9 @@ def mistake_of(
     mistakes = error.errors(include_url=False)
     mistakes.sort(key=lambda mistake: mistake["type"] not in _UNKNOWN)
     mistake = mistakes[0]
-    kind, found = mistake["type"], mistake.get("input")
+    kind, value = mistake["type"], mistake.get("input")
     place, domain, parent = _followed(mistake["loc"], domain)
-    shown = _in_yaml(found, domain) if in_yaml else _shown(found)
+    shown = _in_yaml(value, domain) if in_yaml else _shown(value)
     if kind in _UNKNOWN:
         unknown = no_key(str(place[-1]), list(parameters_of(parent.kind)))
         mistyped = ParameterError(place[:-1], unknown)
@@ -91,8 +91,8 @@ def mistake_of(
     if kind in ("value_error", "assertion_error"):
         return ParameterError(place, str(mistake["ctx"]["error"]))
     reason = f"found {shown}, expected {_expected(kind, mistake.get('ctx', {}), domain)}"
-    if isinstance(found, str):
-        reason += did_you_mean(found, [*domain.choices, *domain.words])
+    if isinstance(value, str):
+        reason += did_you_mean(value, [*domain.choices, *domain.words])
     return ParameterError(place, reason, domain.meaning)
 
 
@@ -175,8 +175,8 @@ def alike(word: str, words: Iterable[str]) -> str | None:
     ('validate', None)
     """
     lower = {each.lower(): each for each in words}
-    found = get_close_matches(word.lower(), list(lower), 1, ALIKE)
-    return lower[found[0]] if found else None
+    close = get_close_matches(word.lower(), list(lower), 1, ALIKE)
+    return lower[close[0]] if close else None
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:

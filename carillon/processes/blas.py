@@ -91,16 +91,16 @@ def blas_by_user() -> dict[str, str]:
     import numpy  # noqa: F401
     import scipy.linalg  # noqa: F401
 
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for info in loaded_blas():
         folder = os.path.basename(os.path.dirname(info["filepath"]))
         user = folder.removesuffix(".libs") if folder.endswith(".libs") else "PETSc"
-        found.setdefault(user, f"{info['internal_api']} {info.get('version') or ''}".strip())
+        names.setdefault(user, f"{info['internal_api']} {info.get('version') or ''}".strip())
     if system_blas_path() is not None:
-        found["PETSc"] = blas_name()
+        names["PETSc"] = blas_name()
         # Without copies of their own they use that of the system.
-        return {user: found.get(user, found["PETSc"]) for user in ("PETSc", "numpy", "scipy")}
-    return {user: found[user] for user in ("numpy", "scipy") if user in found}
+        return {user: names.get(user, names["PETSc"]) for user in ("PETSc", "numpy", "scipy")}
+    return {user: names[user] for user in ("numpy", "scipy") if user in names}
 
 
 def warn_about_reference_blas() -> None:

@@ -61,8 +61,8 @@ class Locator:
         if config.CACHE_DIR != str(cls.folder):
             for known in caching.CacheImpl._locator_classes:
                 own = "UserWide" not in known.__name__  # that cannot be written
-                if own and (found := known.from_function(function, source)):
-                    return found
+                if own and (locator := known.from_function(function, source)):
+                    return locator
             folder = private_folder()
             if folder is None:
                 return _kept_nowhere(function, source)

@@ -48,10 +48,10 @@ def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -
     """
     if not environment.get("PYTHONSAFEPATH"):
         first = os.path.realpath(path[0] or ".") if path else ""
-        found = [each for each in rooms.folders() if each == rooms.INSTALLED or each == first]
+        own = [each for each in rooms.folders() if each == rooms.INSTALLED or each == first]
         others = environment.get("PYTHONPATH")
-        if found:
-            environment["PYTHONPATH"] = os.pathsep.join([*found, *([others] if others else [])])
+        if own:
+            environment["PYTHONPATH"] = os.pathsep.join([*own, *([others] if others else [])])
     environment["PYTHONSAFEPATH"] = "1"
 
 

@@ -54,13 +54,13 @@ def of_packages(room: str) -> str:
 
 def _between(room: str) -> Needs:
     """What the packages directly in a room import of each other, those below them included."""
-    found: Needs = {}
+    needs: Needs = {}
     for package, others in ARROWS.items():
         name = _name(package, room)
         if name is not None:
             inside = {_name(other, room) for other in others.split()} - {None, name}
-            found.setdefault(name, set()).update(other for other in inside if other is not None)
-    return found
+            needs.setdefault(name, set()).update(other for other in inside if other is not None)
+    return needs
 
 
 def _name(package: str, room: str) -> str | None:

@@ -115,16 +115,16 @@ def _measured(name: str, mesh: str, options: DistanceStudyOptions) -> dict[str, 
 def _rated(described: ProblemOptions, way: str, hertz: Array) -> dict[str, Any]:
     discretisation, refine_to = WAYS[way]
     try:
-        found = _solved(replace(described, discretisation=discretisation), refine_to)
+        solved = _solved(replace(described, discretisation=discretisation), refine_to)
     except (UserError, ConvergenceError) as error:
         return {"problem": str(error)}
-    assert found.model is not None
-    true = frequency_errors(_hertz(found.modes) / hertz - 1.0, MODES).rms
-    found.modes.destroy()
+    assert solved.model is not None
+    true = frequency_errors(_hertz(solved.modes) / hertz - 1.0, MODES).rms
+    solved.modes.destroy()
     return {
-        "unknowns": found.model.n_dofs,
+        "unknowns": solved.model.n_dofs,
         "rms": true,
-        "expected": found.achieved.get(f"{FROM_SOLID}_rms"),
+        "expected": solved.achieved.get(f"{FROM_SOLID}_rms"),
     }
 
 
@@ -145,8 +145,8 @@ def _hertz(modes: Modes) -> Array:
 
 def _right(solids: list[dict[str, Any]], way: str) -> dict[str, int]:
     """Number of expected errors within the factor, of all that there are."""
-    found = [solid["ways"][way] for solid in solids if "expected" in solid["ways"].get(way, {})]
-    ratios = [each["expected"] / each["rms"] for each in found if each["expected"] is not None]
+    rated = [solid["ways"][way] for solid in solids if "expected" in solid["ways"].get(way, {})]
+    ratios = [each["expected"] / each["rms"] for each in rated if each["expected"] is not None]
     right = sum(1.0 / FACTOR <= ratio <= FACTOR for ratio in ratios)
     return {"within": right, "of": len(ratios)}
 

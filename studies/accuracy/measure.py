@@ -135,8 +135,8 @@ def _rated(results: Sequence[Spectrum | str], exact: Array) -> dict[str, Any]:
     spectra = [each for each in results if isinstance(each, Spectrum)]
     if not spectra:
         return {"problem": results[0]}
-    found = np.sqrt(np.maximum(spectra[0].values[RIGID_MODES:], 0.0)) / (2.0 * np.pi)
-    errors = frequency_errors(found / exact - 1.0, MODES)
+    frequencies = np.sqrt(np.maximum(spectra[0].values[RIGID_MODES:], 0.0)) / (2.0 * np.pi)
+    errors = frequency_errors(frequencies / exact - 1.0, MODES)
     seconds = {
         name: statistics.median(getattr(each, name) for each in spectra)
         for name in ("build_seconds", "solve_seconds")

@@ -55,8 +55,8 @@ def free_eigenvalues(
     octant = domain.octant()
     moduli = np.full(octant.weights.shape, young)
     kinds = [_of_parities(powers, parities) for parities in product((0, 1), (0, 1), (0, 1))]
-    found = [_eigenvalues(octant, kind, moduli, poisson, density) for kind in kinds]
-    return np.sort(np.concatenate(found))
+    eigenvalues = [_eigenvalues(octant, kind, moduli, poisson, density) for kind in kinds]
+    return np.sort(np.concatenate(eigenvalues))
 
 
 def _of_parities(powers: list[Degrees], parities: Degrees) -> list[list[Degrees]]:

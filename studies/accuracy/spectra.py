@@ -44,16 +44,16 @@ def cells(surface: Surface, name: str, spacing: float, kind: str, modes: int) ->
     begin = time.perf_counter()
     model = _model(surface, ProblemOptions(name, resolution, discretisation=kind))
     built = time.perf_counter()
-    found = modal_analysis(model, SolverOptions(modes=modes), MPI.COMM_SELF)
+    solved = modal_analysis(model, SolverOptions(modes=modes), MPI.COMM_SELF)
     seconds = time.perf_counter() - built
     expected = None
     if isinstance(model, FiniteCellModel):
-        vectors = found.system.gather(found.vectors)
+        vectors = solved.system.gather(solved.vectors)
         assert vectors is not None
-        expected = estimate_cell_errors(model, found.values, vectors).errors.rms
-    found.destroy()
+        expected = estimate_cell_errors(model, solved.values, vectors).errors.rms
+    solved.destroy()
     spacing = longest / resolution
-    return Spectrum(found.values, spacing, model.n_dofs, built - begin, seconds, expected)
+    return Spectrum(solved.values, spacing, model.n_dofs, built - begin, seconds, expected)
 
 
 def _model(surface: Surface, options: ProblemOptions) -> Solid:

@@ -16,8 +16,8 @@ def all_studies() -> dict[str, Study]:
     """All of them by name."""
     packages = [*OF_THE_RUN, *(f"studies.{name}" for name in studies.names_with("study.py"))]
     modules = [import_module(f"{package}.study") for package in packages]
-    found = [each for module in modules for each in vars(module).values()]
-    return {study.name: study for study in found if isinstance(study, Study)}
+    values = [each for module in modules for each in vars(module).values()]
+    return {study.name: study for study in values if isinstance(study, Study)}
 
 
 def of_cases() -> list[CaseStudy]:

@@ -53,13 +53,13 @@ def _cell(study: Campaign, cell: Cell, row: dict[str, Any]) -> Markup:
         target = quote(f"cells/{cell.path}/{result['page']}")
         led = html('<a href="{}">Page of the cell</a>', target)
     if result["reason"] is not None:
-        told = element("p", result["reason"])
+        reason = element("p", result["reason"])
     elif passed:
-        told = html("<p>Nearest to its limit: {what}.</p>", **row)
+        reason = html("<p>Nearest to its limit: {what}.</p>", **row)
     else:
         missed = (each for each in result["criteria"] if each["verdict"] == "missed")
         lines = (html("{group}: {label}: {shown}, required {required}", **each) for each in missed)
-        told = element("p", result.get("advice")) + bullets(lines)
+        reason = element("p", result.get("advice")) + bullets(lines)
     return article(
         None,
         study.label(cell),
@@ -68,7 +68,7 @@ def _cell(study: Campaign, cell: Cell, row: dict[str, Any]) -> Markup:
             html("<span>{seconds:seconds}</span>", **result),
             led,
         ),
-        told,
+        reason,
         element("pre", result["command"], class_="config"),
         class_="cell",
     )

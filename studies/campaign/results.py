@@ -48,8 +48,10 @@ class Campaign(Results):
         ends = [end_of(each) for each in self.found.values()]
         if self.passed:
             return f"Passed: all {len(ends)} cells."
-        told = [f"{ends.count(end)} {end}" for end in ENDS[:-1] if end in ends]
-        return f"Failed: {len(ends) - ends.count(PASSED)} of {len(ends)} cells ({', '.join(told)})."
+        counts = [f"{ends.count(end)} {end}" for end in ENDS[:-1] if end in ends]
+        return (
+            f"Failed: {len(ends) - ends.count(PASSED)} of {len(ends)} cells ({', '.join(counts)})."
+        )
 
     def label(self, cell: Cell) -> str:
         """A cell in a few words."""
@@ -68,12 +70,12 @@ def end_of(result: Mapping[str, Any]) -> str:
 
 def share_of(criterion: Mapping[str, Any]) -> float:
     """What a criterion found as a share of its limit; infinite for what is missed by a count."""
-    found, limit = criterion["found"], criterion["limit"]
-    if found is None:
+    value, limit = criterion["found"], criterion["limit"]
+    if value is None:
         return float("inf")
     if criterion["key"] in ("rigid", "counted"):
-        return 0.0 if found == limit else float("inf")
-    return float(found / max(limit, SMALLEST))
+        return 0.0 if value == limit else float("inf")
+    return float(value / max(limit, SMALLEST))
 
 
 def nearest(result: Mapping[str, Any]) -> Mapping[str, Any] | None:

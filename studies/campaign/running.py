@@ -46,10 +46,10 @@ def validated(arguments: list[str], folder: Path, cores: int, log: Path) -> dict
         return {**result, "passed": False, "reason": reason, "criteria": [], "wrong": []}
     (page,) = (folder / "validation").glob("*.html")
     evidence = Evidence(folder, page.stem)
-    found = verdict(evidence)
+    outcome = verdict(evidence)
     return {
         **result,
-        **{key: found[key] for key in ("passed", "wrong", "advice")},
+        **{key: outcome[key] for key in ("passed", "wrong", "advice")},
         "reason": None,
         "criteria": [_finite(criterion.row) for criterion in judge(evidence)],
         "page": str(page.relative_to(folder)),

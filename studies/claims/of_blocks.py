@@ -35,8 +35,8 @@ def scaling(claims: Claims) -> Finding:
     row = forests_row(by_method(claims.of_run("blocks")))
     within, beyond = row["kind0_nodal"], row["kind1_nodal"]
     verdict = REPRODUCED if beyond <= (1.0 + SIMILAR) * within else NOT
-    told = [show(value, "fraction") for value in (within, beyond)]
-    text = f"{told[0]} on 0 to 10 GPa, {told[1]} on 100 to 10,000 GPa."
+    shown = [show(value, "fraction") for value in (within, beyond)]
+    text = f"{shown[0]} on 0 to 10 GPa, {shown[1]} on 100 to 10,000 GPa."
     return Finding(verdict, text, ("tables/blocks.json",))
 
 

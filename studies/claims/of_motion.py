@@ -92,8 +92,8 @@ def scene(claims: Claims) -> Finding:
         for row in claims.scene.rows
         if row.get("distance_decibels")
     ]
-    told = f", off the truth’s by (rms) {', '.join(apart)}" if apart else ""
-    text = f"The same scene by each is below{told}; {single}, are on the pages of the validation."
+    beside = f", off the truth’s by (rms) {', '.join(apart)}" if apart else ""
+    text = f"The same scene by each is below{beside}; {single}, are on the pages of the validation."
     return Finding(IN_PART, text, (named(claims, claims.scene), *files(claims, "-responses.json")))
 
 

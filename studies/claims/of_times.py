@@ -26,7 +26,7 @@ def convergence(claims: Claims) -> Finding:
     table = claims.in_full("convergence") or claims.of_run("convergence")
     if not table.rows:
         return Finding(UNMEASURED, "No convergence was followed in this run.")
-    told, agree = [], []
+    sentences, agree = [], []
     for model in dict.fromkeys(row["model"] for row in table.rows):
         rows = [
             row
@@ -42,12 +42,12 @@ def convergence(claims: Claims) -> Finding:
             )
             for start in (SYNTHESIS, RANDOM)
         }
-        told.append(
+        sentences.append(
             f"{rows[0]['title']}: {show(worst[SYNTHESIS], 'percent')} from HCMS, "
             f"{show(worst[RANDOM], 'percent')} from random vectors"
         )
         agree.append(worst[SYNTHESIS] < SIMILAR * worst[RANDOM])
-    text = f"Worst eigenvalue after {last} over-relaxed corrections: {'; '.join(told)}."
+    text = f"Worst eigenvalue after {last} over-relaxed corrections: {'; '.join(sentences)}."
     return Finding(REPRODUCED if all(agree) else NOT, text, (named(claims, table),))
 
 
@@ -55,18 +55,18 @@ def total(claims: Claims) -> Finding:
     """Fig. 11: all methods together."""
     design = claims.of_run("design")
     full = claims.in_full("methods")
-    told, ratios, tuned = [], [], []
+    sentences, ratios, tuned = [], [], []
     for base, label in (("slepc", "tuned SLEPc"), ("arpack", "ARPACK in shift-and-invert mode")):
         cold, warm = (speed_ups(full, base, name) for name in ("ddfem_ec", "ddfem_ec_warm"))
         if cold and warm:
-            told.append(f"{label}: {ends(cold)} cold, {ends(warm)} warm")
+            sentences.append(f"{label}: {ends(cold)} cold, {ends(warm)} warm")
             ratios += [*cold, *warm]
             tuned += cold
     for row in claims.kept.values():
         seconds = row["seconds"]
         plain = seconds["arpack_regular"]
         cold, warm = [plain / seconds["ddfem_ec"]], [plain / seconds["ddfem_ec_warm"]]
-        told.append(
+        sentences.append(
             f"ARPACK without a factorisation, {show(plain, 'seconds')} for {row['modes']} modes of "
             f"the {row['model']} of {show(row['dof_fine'], 'count')} unknowns ({row['clock']}): "
             f"{ends(cold)} cold, {ends(warm)} warm"
@@ -75,7 +75,7 @@ def total(claims: Claims) -> Finding:
     if design.rows:
         own = [(row["cold"], row["warm"]) for row in design.rows]
         cold, warm = ([float(each[number]) for each in own] for number in (0, 1))
-        told.append(f"SLEPc in this run, smaller: {ends(cold)} cold, {ends(warm)} warm")
+        sentences.append(f"SLEPc in this run, smaller: {ends(cold)} cold, {ends(warm)} warm")
         ratios += [*cold, *warm]
         tuned += cold
     if not ratios:
@@ -87,23 +87,23 @@ def total(claims: Claims) -> Finding:
     kept = (MEASURED.name,) if claims.kept else ()
     own_table = ("tables/design.json",) if design.rows else ()
     of_full = (named(claims, full),) if full else ()
-    return Finding(verdict, f"Faster than {'; '.join(told)}.", (*of_full, *kept, *own_table))
+    return Finding(verdict, f"Faster than {'; '.join(sentences)}.", (*of_full, *kept, *own_table))
 
 
 def each(claims: Claims) -> Finding:
     """Section 8.1: coarsening alone, and component mode synthesis with correction alone."""
     full = claims.in_full("methods") or claims.of_run("methods")
     names = {"ddfem": "DDFEM* alone", "hcms_ec": EXACT, "fastest": "--method auto"}
-    found = {name: speed_ups(full, "slepc", name) for name in names}
-    told = [f"{names[name]} {ends(values)}" for name, values in found.items() if values]
-    if not told:
+    ratios = {name: speed_ups(full, "slepc", name) for name in names}
+    sentences = [f"{names[name]} {ends(values)}" for name, values in ratios.items() if values]
+    if not sentences:
         return Finding(UNMEASURED, "Methods were not timed in this run.")
     verdict = (
         REPRODUCED
-        if all(min(found[name] or [0.0]) >= TWO_ORDERS for name in ("ddfem", "hcms_ec"))
+        if all(min(ratios[name] or [0.0]) >= TWO_ORDERS for name in ("ddfem", "hcms_ec"))
         else NOT
     )
-    return Finding(verdict, f"Over SLEPc: {', '.join(told)}.", (named(claims, full),))
+    return Finding(verdict, f"Over SLEPc: {', '.join(sentences)}.", (named(claims, full),))
 
 
 def interactive(claims: Claims) -> Finding:

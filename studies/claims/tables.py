@@ -42,16 +42,16 @@ def claims(results: Claims) -> Iterator[Row]:
     texts.filters["show"] = show
     values = printed(results.paper)
     for name, measure in MEASURES.items():
-        found = measure(results)
+        finding = measure(results)
         written = TEXTS[name]
         yield {
             "key": name,
             "place": written["place"],
             "claim": texts.from_string(written["claim"]).render(values),
-            "measured": found.text,
-            "verdict": found.verdict,
+            "measured": finding.text,
+            "verdict": finding.verdict,
             "why": written["why"],
-            "files": ", ".join(found.files),
+            "files": ", ".join(finding.files),
         }
 
 

@@ -130,8 +130,8 @@ def _speeds(study: CoarseningStudy) -> Markup:
     names = ["the default method", *list(METHODS.values())[1:]]
     sentence = """By {} a coarse model with all that follows is {median:times} times as fast as the
         fine solid in the median, {least:times} to {most:times} times."""
-    told = (html(sentence, name, **speeds(study, each)) for each, name in zip(METHODS, names))
-    return parts.together(*told, between=" ")
+    sentences = (html(sentence, name, **speeds(study, each)) for each, name in zip(METHODS, names))
+    return parts.together(*sentences, between=" ")
 
 
 def _solid(study: CoarseningStudy, tables: Tables, solid: str, first: bool) -> Markup:

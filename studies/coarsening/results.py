@@ -48,8 +48,8 @@ class CoarseningStudy(CaseResults):
 
     def worst_of(self, solid: str) -> tuple[Case, Mode] | None:
         """The worst mode of the plain models of a solid, of which there is a picture."""
-        found = [(case, mode) for case, mode in self.far_off("plain") if case.solid == solid]
-        return max(found, key=lambda pair: _badness(pair[1]), default=None)
+        modes = [(case, mode) for case, mode in self.far_off("plain") if case.solid == solid]
+        return max(modes, key=lambda pair: _badness(pair[1]), default=None)
 
     def pictures_of(self, case: Case) -> Path:
         """File with the pictures of a case."""

@@ -72,14 +72,14 @@ def compare_optimisers(
     rows = []
     project = problem.project
     for method in OPTIMISERS:
-        found = []
+        outcomes = []
         for number in range(seeds):
             seed = project.optimiser.seed + number
             report(method if seeds == 1 else f"{method}, seed {seed}")
             chosen = replace(project.optimiser, method=method, seed=seed, fine_check=fine_check)
             own = replace(problem, project=replace(project, optimiser=chosen))
-            found.append(_outcome(optimise(own)))
-        rows.append({"method": method, "seeds": seeds, **_medians(found)})
+            outcomes.append(_outcome(optimise(own)))
+        rows.append({"method": method, "seeds": seeds, **_medians(outcomes)})
     return rows
 
 
@@ -124,7 +124,7 @@ def _outcome(design: Design) -> dict[str, Any]:
         seconds = np.array([check["seconds"] for check in evidence["checks"]])
         costs = np.minimum.accumulate([check["cost"] for check in evidence["checks"]])
     low = np.flatnonzero(costs <= 0.1 * start)
-    wanted = design.targets.frequencies
+    targets = design.targets.frequencies
     return {
         "cost_start": start,
         "cost_end": end,
@@ -133,23 +133,23 @@ def _outcome(design: Design) -> dict[str, Any]:
         "evaluations": evidence["evaluations"],
         "evaluations_per_minute": evidence["evaluations_per_minute"],
         "seconds": evidence["seconds"],
-        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, wanted),
+        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, targets),
         "workers": evidence["workers"],
         "curve": [[float(s), float(c)] for s, c in zip(seconds, costs, strict=True)],
     }
 
 
-def _medians(found: list[dict[str, Any]]) -> dict[str, Any]:
+def _medians(outcomes: list[dict[str, Any]]) -> dict[str, Any]:
     """Medians, smallest and largest values of outcomes, and the curve of the one in the middle.
 
     What some did not come to is larger than all.
     """
-    middle = sorted(found, key=lambda each: each["cost_end"])[(len(found) - 1) // 2]
+    middle = sorted(outcomes, key=lambda each: each["cost_end"])[(len(outcomes) - 1) // 2]
     row = {"workers": middle["workers"], "curve": middle["curve"]}
     for name in middle.keys() - row.keys():
-        values = [np.inf if each[name] is None else each[name] for each in found]
-        told = {name: median(values), f"{name}_min": min(values), f"{name}_max": max(values)}
-        row |= {key: value if np.isfinite(value) else None for key, value in told.items()}
+        values = [np.inf if each[name] is None else each[name] for each in outcomes]
+        spread = {name: median(values), f"{name}_min": min(values), f"{name}_max": max(values)}
+        row |= {key: value if np.isfinite(value) else None for key, value in spread.items()}
     return row
 
 

@@ -111,12 +111,12 @@ def differences(reference: dict[str, Any], found: dict[str, Any]) -> Row:
         np.array(each) for each in (reference["frequencies_hz"], reference["amplitudes"][0])
     )
     loud = amplitudes > amplitudes.max() * 10.0 ** (-SPAN_DECIBELS / 20.0)
-    wanted = hertz[loud & (hertz < HIGHEST_HERTZ)]
+    loud_hertz = hertz[loud & (hertz < HIGHEST_HERTZ)]
     others = np.array(found["frequencies_hz"])
-    cents = 1200.0 * np.abs(np.log2(others / wanted[:, None])).min(axis=1)
+    cents = 1200.0 * np.abs(np.log2(others / loud_hertz[:, None])).min(axis=1)
     return {
         "modes": len(others),
-        "strong": len(wanted),
+        "strong": len(loud_hertz),
         "same": int((cents < SAME_CENTS).sum()),
         "median_cents": float(np.median(cents)),
         "worst_cents": float(cents.max()),

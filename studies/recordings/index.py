@@ -121,7 +121,7 @@ def formats(index: Recordings) -> list[Row]:
 
 def page(index: Recordings, tables: dict[str, Table]) -> StudyPage:
     """Build the page from its tables."""
-    told = [
+    sentences = [
         (
             html("{decibels:fraction} dB", **row),
             html(
@@ -141,7 +141,7 @@ def page(index: Recordings, tables: dict[str, Table]) -> StudyPage:
         lede="""Real strikes, with noise, rooms and compressors in them: how much of each do damped
             sinusoids explain?""",
         sections=[
-            section("Result", tiles(*told), grid(tables["groups"], by="split")),
+            section("Result", tiles(*sentences), grid(tables["groups"], by="split")),
             section(
                 "Recordings",
                 prose(html("Spectra, sounds and modes of {}.", html(", ").join(led))),

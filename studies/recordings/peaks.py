@@ -72,14 +72,14 @@ def strong_peaks(samples: Array, rate: int) -> Peaks:
     if not len(hertz):
         return Peaks(np.zeros(0), np.zeros(0), resolution)
     step = hertz[1] - hertz[0] if len(hertz) > 1 else resolution
-    found, _ = find_peaks(
+    peaks, _ = find_peaks(
         levels,
         height=levels.max() - SPAN_DECIBELS,
         prominence=PROMINENCE,
         distance=max(1, int(1.5 * resolution / step)),
     )
-    found = found[levels[found] > _local_median(levels, MEDIAN_HERTZ / step)[found] + ABOVE_MEDIAN]
-    return Peaks(hertz[found], levels[found] - levels.max(), resolution)
+    peaks = peaks[levels[peaks] > _local_median(levels, MEDIAN_HERTZ / step)[peaks] + ABOVE_MEDIAN]
+    return Peaks(hertz[peaks], levels[peaks] - levels.max(), resolution)
 
 
 def _local_median(levels: Array, reach: float) -> Array:

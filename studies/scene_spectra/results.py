@@ -32,11 +32,11 @@ class SceneSpectra(Results):
         """Sound pressure (s,) [Pa] at the left ear, of each rendering."""
         import soundfile
 
-        found = {}
+        spectra = {}
         for name, told in self.told.items():
             ears = soundfile.read(self.folder / FOLDER / name / SOUND, always_2d=True)[0]
-            found[name] = told["full_scale_pascal"] * ears[:, 0]
-        return found
+            spectra[name] = told["full_scale_pascal"] * ears[:, 0]
+        return spectra
 
     @property
     def rate(self) -> int:

@@ -132,7 +132,7 @@ def _heard(results: SoundResults) -> Section:
         loud = [part / max(float(np.abs(part).max()), 1e-30) for part in played]
         source = wav_uri(np.concatenate(loud), sounds[-1][1], 1.0)
         name = html('<span class="name">{}</span>', target.name.capitalize())
-        told = facts(name, "target, then the sound that was found")
-        panels.append(figure(told, audio(source, f"{example.title}, {target.name}")))
+        caption = facts(name, "target, then the sound that was found")
+        panels.append(figure(caption, audio(source, f"{example.title}, {target.name}")))
     about = prose(f"{example.about} ({example.figure})", html(led, example.name))
     return section(example.title, about, div("panels", *panels), id=example.name)

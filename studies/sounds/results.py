@@ -134,9 +134,9 @@ class SoundResults(Results):
         point = targets.names.index(name)
         clip, own = self.sound(CLIPS, name)
         # The design does not hold where in its clip the modes begin; the user's cache does.
-        found = extract_file(self.file(f"{CLIPS}/{name}.wav"))
-        begin, count = round(found.evidence["strike_seconds"] * own), len(found.residual)
+        extracted = extract_file(self.file(f"{CLIPS}/{name}.wav"))
+        begin, count = round(extracted.evidence["strike_seconds"] * own), len(extracted.residual)
         bank = Bank(targets.frequencies, targets.dampings, own)
-        wanted = ring(bank, [(0.0, targets.amplitudes[point])], count)
-        parts = (clip[begin : begin + count], found.modal_part(), wanted)
+        requested = ring(bank, [(0.0, targets.amplitudes[point])], count)
+        parts = (clip[begin : begin + count], extracted.modal_part(), requested)
         return TargetSounds(*(resampled(part, own, rate) for part in parts))

@@ -119,10 +119,10 @@ class Guard:
         return None
 
     def _is_own(self, host: str) -> bool:
-        found = _HOST.fullmatch(host)
-        if found is None or int(found["port"] or 80) > 65535:
+        parts = _HOST.fullmatch(host)
+        if parts is None or int(parts["port"] or 80) > 65535:
             return False
-        name = found["name"].strip("[]").lower()
+        name = parts["name"].strip("[]").lower()
         if self._addresses and _is_address(name):
             return not ipaddress.ip_address(name).is_unspecified
         return name in self._names

@@ -112,9 +112,9 @@ class Clips:
 
     async def spectrum(self, identifier: str) -> dict[str, list[float]]:
         """A clip's spectrum."""
-        found: dict[str, list[float]]
-        found = await self._worker.call("spectrum", self._file(self.named(identifier)))
-        return found
+        partials: dict[str, list[float]]
+        partials = await self._worker.call("spectrum", self._file(self.named(identifier)))
+        return partials
 
     def state(self) -> list[dict[str, Any]]:
         """All clips, as the page gets them."""

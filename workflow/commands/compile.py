@@ -61,8 +61,8 @@ def run(arguments: argparse.Namespace) -> None:
     for name in arguments.groups:
         if name not in GROUPS:
             raise UserError(f"no group {name!r} of kernels, expected {', '.join(GROUPS)}")
-    wanted = sources()
-    groups = [name for name in arguments.groups or GROUPS if not compiled(name, wanted)]
+    requested = sources()
+    groups = [name for name in arguments.groups or GROUPS if not compiled(name, requested)]
     if not groups:
         return
     say(f"compiling kernels of {', '.join(groups)}: once, in about a minute")
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
         with suppress(OSError, UserError):
             DONE.mkdir(exist_ok=True)
             with atomic_path(DONE / f"{name}.json") as temporary:
-                temporary.write_text(wanted)
+                temporary.write_text(requested)
 
 
 def _compile(group: str) -> None:

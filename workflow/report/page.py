@@ -24,7 +24,7 @@ def page(run: Run, tables: Tables) -> StudyPage:
 
     Nothing is computed anew: every number comes from a table, so that page and tables agree.
     """
-    found = findings(tables, run.config["solver"]["refine_to"])
+    results = findings(tables, run.config["solver"]["refine_to"])
     solids = len(run.models)
     return StudyPage(
         title=run.config["title"],
@@ -34,14 +34,14 @@ def page(run: Run, tables: Tables) -> StudyPage:
             close does the fast spectrum come to the ground truth, and how much faster is it?""",
             solids,
             "s" * (solids > 1),
-            found["elastic_modes"],
+            results["elastic_modes"],
         ),
         sections=[
             section(
                 "Verdict",
-                *verdict.design(run, tables["design"], found["design"]),
-                *verdict.costs(found["costs"]),
-                *verdict.spectra(run, tables, found),
+                *verdict.design(run, tables["design"], results["design"]),
+                *verdict.costs(results["costs"]),
+                *verdict.spectra(run, tables, results),
             ),
             section("Solids", *(_model(run, tables, model) for model in run.models)),
             _convergence(run, tables["convergence"]),
@@ -64,12 +64,14 @@ def mode_pictures(run: Run, model: str) -> Markup:
     described = run.read_json(f"figures/{model}-mode.json")
     shown = []
     for variant in run.shown_variants(model):
-        told = described[variant]
+        metadata = described[variant]
         source = parts.picture_uri(run.figure(f"{model}-mode-{variant}.png"))
         alt = f"{run.titles[model]}, mode 7 by {VARIANTS[variant].label}"
-        known = "reference" if variant == TRUTH else f"likeness {told['likeness']:.4f}"
-        picture = parts.image({**told, "source": source}, alt)
-        line = html("<p>{}<br>{hertz:hertz} Hz<br> {}</p>", variant_name(variant), known, **told)
+        known = "reference" if variant == TRUTH else f"likeness {metadata['likeness']:.4f}"
+        picture = parts.image({**metadata, "source": source}, alt)
+        line = html(
+            "<p>{}<br>{hertz:hertz} Hz<br> {}</p>", variant_name(variant), known, **metadata
+        )
         shown.append(picture + line)
     combined = described[TRUTH]["combined"]
     mixed = (
@@ -172,8 +174,8 @@ def _errors(run: Run, tables: Tables, model: str) -> list[Any]:
 
     def row(table: str, variant: str) -> Row:
         name = VARIANTS[variant].label
-        (found,) = tables[table].having({"model": model, "variant": name})
-        return found
+        (matching,) = tables[table].having({"model": model, "variant": name})
+        return matching
 
     error = """{variant}: eigenvalues median {median:percent}, worst {max:percent}; frequencies 7–60
         rms {rms_7_60:percent}."""

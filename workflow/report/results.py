@@ -93,8 +93,8 @@ class Run(Results):
         part = self.config["models"][model]
         names = ["comparisons", *(["further_comparisons"] if further_of(part) else [])]
         files = [self.read_json(f"models/{model}/{name}.json") for name in names]
-        found = {name: each for file in files for name, each in file["comparisons"].items()}
-        return {name: found[name] for name in candidates_of(part)}
+        comparisons = {name: each for file in files for name, each in file["comparisons"].items()}
+        return {name: comparisons[name] for name in candidates_of(part)}
 
     @cached_property
     def shards(self) -> dict[str, dict[str, Any]]:

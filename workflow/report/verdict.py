@@ -175,8 +175,8 @@ def spectra(run: Run, tables: Tables, found: dict[str, Any]) -> list[Any]:
 def _missed(run: Run, rows: list[Row]) -> Markup | str:
     if not rows:
         return ""
-    told = "{variant} of {} reached {estimate:small} in {corrections} corrections"
-    runs = html("; ").join(html(told, run.titles[row["model"]], **row) for row in rows)
+    sentence = "{variant} of {} reached {estimate:small} in {corrections} corrections"
+    runs = html("; ").join(html(sentence, run.titles[row["model"]], **row) for row in rows)
     text = html(
         """The correction <em>missed</em> its tolerance of {:small} here: {}. These spectra are
         shown as they are.""",

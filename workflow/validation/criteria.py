@@ -144,10 +144,10 @@ def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
 def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
     """Of what has a limit; the rest is told only."""
     distance = evidence.distance
-    found = {f"solid_{key}": abs(distance[key]) if distance else None for key in ("rms", "worst")}
+    values = {f"solid_{key}": abs(distance[key]) if distance else None for key in ("rms", "worst")}
     limited = {
         key: Worst(value, evidence.tolerances[key])
-        for key, value in found.items()
+        for key, value in values.items()
         if evidence.tolerances[key] is not None
     }
     first, last = distance.get("modes", (AUDIBLE_FIRST, AUDIBLE_LAST))
@@ -166,8 +166,8 @@ def _criteria(
         "truth": evidence.file(f"{TRUTH}.h5"),
     }
     for key, each in values.items():
-        told = names | {"where": each.where}
-        texts = {name: text.format(**told) for name, text in TEXTS[part][key].items()}
+        filled = names | {"where": each.where}
+        texts = {name: text.format(**filled) for name, text in TEXTS[part][key].items()}
         yield Criterion(
             variant,
             key,

@@ -61,8 +61,8 @@ class Evidence(Run):
     @cached_property
     def compared(self) -> dict[str, dict[str, Any]]:
         """Errors against the truth by shown variant, from `solver compare`."""
-        found = self._comparisons["comparisons"]
-        return {name: found[name] for name in self.shown if name != TRUTH}
+        comparisons = self._comparisons["comparisons"]
+        return {name: comparisons[name] for name in self.shown if name != TRUTH}
 
     @cached_property
     def _comparisons(self) -> dict[str, Any]:
@@ -76,8 +76,10 @@ class Evidence(Run):
     @cached_property
     def response(self) -> ResponseFile:
         """Motion and sound of a strike by shown variant, from `solver respond`."""
-        found = read_response(self.folder / self.file("response.h5"))
-        return replace(found, responses={name: found.responses[name] for name in self.shown})
+        responses = read_response(self.folder / self.file("response.h5"))
+        return replace(
+            responses, responses={name: responses.responses[name] for name in self.shown}
+        )
 
     @property
     def origins(self) -> dict[str, Record]:

@@ -93,8 +93,8 @@ def response(evidence: Evidence) -> Worst:
     unknowns = truth.model.n_dofs
     allowed = motion_limit(struck.seen, errors, damping, struck.seconds, unknowns)
     limit = evidence.tolerances["response"]
-    found = struck.responses[SOLVED].difference
-    return Worst(found, allowed if limit is None else limit, allowed)
+    difference = struck.responses[SOLVED].difference
+    return Worst(difference, allowed if limit is None else limit, allowed)
 
 
 def _errors(evidence: Evidence, variant: str) -> Array:

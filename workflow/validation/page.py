@@ -103,7 +103,7 @@ def _judged(evidence: Evidence, tables: Tables) -> tuple[Section, Section]:
         for part in judged["parts"]
     )
     passed = "passed" if judged["passed"] else "failed"
-    told = section(
+    shown = section(
         "Verdict",
         parts.element("p", judged["headline"], class_=f"judgement {passed}"),
         prose(judged["advice"]),
@@ -136,7 +136,7 @@ def _judged(evidence: Evidence, tables: Tables) -> tuple[Section, Section]:
     of_solid = (parts.element("p", f"{last['sentence']}{limits}"), grid(tables["solid"]))
     articles = [*map(_criteria, others), _criteria(last, *of_solid)]
     proof = parts.element("p", about, class_="proof")
-    return told, section("Criteria", *articles, proof)
+    return shown, section("Criteria", *articles, proof)
 
 
 def _criteria(part: dict[str, Any], *further: Markup) -> Markup:

@@ -102,8 +102,8 @@ def sound(evidence: Evidence) -> Section:
         drawn = inlined(plots.sound_figure(response, variant), f"sound-{variant}")
         source = wav_uri(part.sound, rate, loudest)
         player = parts.audio(source, f"Sound by {VARIANTS[variant].label}")
-        told = parts.facts(variant_name(variant), heard)
-        panels.append(parts.figure(told, drawn, player, class_="plot"))
+        caption = parts.facts(variant_name(variant), heard)
+        panels.append(parts.figure(caption, drawn, player, class_="plot"))
     contact = 1e3 * response.attributes["contact_seconds"]
     about = html(STRIKES, STRIKE_SECONDS, _place(evidence, "third"), contact)
     proof = parts.element("p", about, class_="proof")

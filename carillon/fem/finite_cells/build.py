@@ -183,7 +183,7 @@ def _better_resolution(
         trial = even_grid(surface, better)
         if np.prod([float(size) for size in trial.shape]) > largest:
             return None
-        found = find_inside(surface, trial)
-        if accepts(found) and abs(_seen_share(surface, found, trial) - 1.0) <= SURELY_SEEN:
+        inside = find_inside(surface, trial)
+        if accepts(inside) and abs(_seen_share(surface, inside, trial) - 1.0) <= SURELY_SEEN:
             return better
     return None

@@ -100,7 +100,7 @@ def cover_of(inside: Inside) -> LatticeCover:
     slight[~whole[owner]] = lines < FEWEST_LINES
     among_cut = np.full(len(places), -1)
     among_cut[cut] = np.arange(len(cut))
-    found = LatticeCover(
+    cover = LatticeCover(
         places,
         among_cut,
         labels,
@@ -112,7 +112,7 @@ def cover_of(inside: Inside) -> LatticeCover:
         np.empty((0, 3), dtype=np.int64),
         slight[holds],
     )
-    return _with_meetings(found, numbers)
+    return _with_meetings(cover, numbers)
 
 
 def _with_meetings(cover: LatticeCover, numbers: Index) -> LatticeCover:
@@ -174,8 +174,8 @@ def faces_of_halves(whole: LatticeCover, half: LatticeCover, undivided: Flags) -
             other_part = half.numbered(there[pair], other_part)
             ends = np.full(len(pair), axis), np.full(len(pair), side)
             rows.append(np.stack([one, other_part, *ends], axis=1))
-    found = np.concatenate(rows)
-    return found[(found[:, :2] >= 0).all(axis=1)]
+    faces = np.concatenate(rows)
+    return faces[(faces[:, :2] >= 0).all(axis=1)]
 
 
 def _by_cell(values: NDArray[np.int8]) -> NDArray[np.int8]:

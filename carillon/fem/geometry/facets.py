@@ -173,13 +173,13 @@ def closed_parts(facets: Facets) -> list[ClosedPart]:
     volumes = signed_volumes(facets, part, ones)
     outward = 1.0 if volumes[closed].sum() >= 0.0 else -1.0
     order = np.argsort(part, kind="stable")
-    found = []
+    parts = []
     for own in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
         if closed[part[own[0]]]:
             corners = facets.vertices[facets.triangles[own]].reshape(-1, 3)
             volume = outward * float(volumes[part[own[0]]])
-            found.append(ClosedPart(own, volume, corners.min(axis=0), corners.max(axis=0)))
-    return found
+            parts.append(ClosedPart(own, volume, corners.min(axis=0), corners.max(axis=0)))
+    return parts
 
 
 def parts_of(facets: Facets, sign: Index, balance: Index) -> tuple[Index, Flags]:
