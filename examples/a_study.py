@@ -12,9 +12,9 @@ figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 for way, resolutions in {"voxel": (12, 16, 24, 32), "finite-cell": (8, 12, 16)}.items():
     unknowns, errors = [], []
     for resolution in resolutions:
-        found = ca.solve("builtin:bowl", resolution=resolution, modes=26, discretisation=way)
-        error = found.frequencies[6:] / truth.frequencies[6:] - 1.0
-        unknowns.append(found.solid.n_dofs)
+        solution = ca.solve("builtin:bowl", resolution=resolution, modes=26, discretisation=way)
+        error = solution.frequencies[6:] / truth.frequencies[6:] - 1.0
+        unknowns.append(solution.solid.n_dofs)
         errors.append(np.sqrt(np.mean(error**2)))
         print(f"{way}, {resolution}: {unknowns[-1]:,} unknowns, rms {errors[-1]:.2%}")
     axes.loglog(unknowns, errors, "o-", label=way)
