@@ -350,8 +350,7 @@ def solve(
 
     ranks = MPI.COMM_WORLD if comm is None else comm
     solid = compute_on_root(ranks, lambda: _solid(body, material, resolution, discretisation))
-    is_elsewhere = isinstance(initial, Solution) and initial.shapes is None
-    start = None if initial is None or is_elsewhere else _modes_of(initial).modes
+    start = compute_on_root(ranks, lambda: None if initial is None else _start(initial, solid))
     result = library.solve(
         solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
     )
@@ -819,6 +818,20 @@ def _modes_of(solution: Solution | str | Path) -> ModesFile:
     if isinstance(solution, str | Path):
         return read_modes(solution)
     raise UserError(f"found {solution!r:.100}, expected a solution or the path of a modes file")
+
+
+def _start(initial: Solution, solid: Solid | None) -> Array | None:
+    assert solid is not None
+    file = _modes_of(initial)
+    there, here = file.mesh, solid.mesh
+    if not (
+        np.array_equal(there.node_grid, here.node_grid) and np.array_equal(there.cells, here.cells)
+    ):
+        raise UserError(
+            f"initial: modes of another mesh ({there.n_nodes:,} nodes), expected the one to solve "
+            f"({here.n_nodes:,} nodes) with any material"
+        )
+    return file.modes
 
 
 def _heard(source: Solution | Design | str | Path, damping: Damping | None) -> HeardSolid:

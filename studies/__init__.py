@@ -40,8 +40,7 @@ def rules() -> list[Path]:
     def add(name: str, needed_by: str) -> None:
         if name not in present:
             raise UserError(
-                f"there is no folder studies/{name}, which {needed_by} needs; put it back, or "
-                f"take {needed_by} away, too"
+                f"there is no folder studies/{name}, which {needed_by} needs; put it back"
             )
         for other in getattr(import_module(f"studies.{name}"), "NEEDS", ()):
             add(other, f"studies/{name}")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from carillon.errors import UserError
-from carillon.files.yaml_input import line_of, read_marked
+from carillon.files.yaml_input import DEEPEST, line_of, read_marked
 from carillon.parameters.fields import ValueDomain, parameters_of
 from carillon.parameters.model import EXACT, adapter
 from carillon.parameters.sentences import ParameterError, Place, mistake_of, no_key
@@ -95,6 +95,8 @@ def with_defaults(document: Mapping[str, Any], model: type) -> dict[str, Any]:
 
 def _plain(value: Any, place: Place) -> Any:
     """The value with whole numbers for floats that are such, fit to be written as JSON."""
+    if len(place) > DEEPEST:
+        raise ParameterError(place[:1], f"nested deeper than {DEEPEST} levels")
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):

@@ -25,8 +25,8 @@ class ValueDomain:
     """What they are, with the unit in brackets; empty if the annotation does not say."""
     limits: Mapping[str, float] = field(default_factory=dict)
     """By the names of `annotated_types`: ge, gt, le, lt, min_length, max_length."""
-    why: str = ""
-    """Reason for the limits, where there is one to tell."""
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    """Reasons for those limits that have one to tell."""
     choices: tuple[str, ...] = ()
     """Texts that are admitted, if not all are."""
     words: tuple[str, ...] = ()
@@ -145,7 +145,7 @@ def _united(members: list[Any], nullable: bool) -> ValueDomain:
 
 
 def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
-    limits = dict(domain.limits)
+    limits, reasons = dict(domain.limits), dict(domain.reasons)
     for mark in marks:
         if isinstance(mark, str):
             domain = replace(domain, meaning=mark)
@@ -155,6 +155,7 @@ def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
             domain = replace(domain, choices=mark.names)
         else:
             known = {name: getattr(mark, name, None) for name in _LIMITS}
-            limits |= {name: value for name, value in known.items() if value is not None}
-            domain = replace(domain, why=getattr(mark, "why", "") or domain.why)
-    return replace(domain, limits=limits)
+            own = {name: value for name, value in known.items() if value is not None}
+            limits |= own
+            reasons |= dict.fromkeys(own, getattr(mark, "why", ""))
+    return replace(domain, limits=limits, reasons=reasons)

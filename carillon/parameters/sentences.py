@@ -30,6 +30,12 @@ _RULES = {
     "string_too_long": "at most {max_length} characters",
     "finite_number": "a finite number",
 }
+_BOUNDS = {
+    "greater_than_equal": "ge",
+    "greater_than": "gt",
+    "less_than_equal": "le",
+    "less_than": "lt",
+}
 _LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 
@@ -149,7 +155,8 @@ def _expected(kind: str, context: dict[str, Any], domain: ValueDomain) -> str:
         if "than" in kind and domain.unit:
             bound += f" {domain.unit}"
         bound += f", or {' or '.join(domain.words)}" if domain.words else ""
-        return f"{bound}, since {domain.why}" if domain.why and "than" in kind else bound
+        why = domain.reasons.get(_BOUNDS.get(kind, ""))
+        return f"{bound}, since {why}" if why else bound
     if domain.choices:
         return f"one of {', '.join(domain.choices)}"
     named = [_KINDS.get(domain.kind, "keys and values"), *domain.words, *["null"] * domain.nullable]

@@ -68,7 +68,8 @@ def _type(domain: ValueDomain) -> str:
     known = _LENGTHS if domain.kind in (tuple, dict) else _BOUNDS
     limits = domain.limits
     bounds = [known[name].format(_number(limits[name])) for name in known if name in limits]
-    why = f", since {domain.why}" if domain.why else ""
+    reasons = dict.fromkeys(filter(None, domain.reasons.values()))
+    why = f", since {' and '.join(reasons)}" if reasons else ""
     return ", ".join([kind, *bounds]) + why
 
 

@@ -12,7 +12,7 @@ from carillon.fem.materials import young_modulus
 from carillon.fem.model import Solid, fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
-from solver.distribution.collective import compute_on_root
+from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.files.initial_modes import scatter_rows
 from solver.files.modes_file import frequencies
 
@@ -83,7 +83,7 @@ def solve(
     solid = compute_on_root(comm, lambda: _with_material(model, material))
     solver = ModalSolver(solid, SolverOptions(modes=modes, **options), comm)
     whole = initial_modes.modes if isinstance(initial_modes, Solution) else initial_modes
-    count = comm.bcast(None if whole is None else whole.shape[1])
+    count = bcast_from_root(comm, lambda: _columns(whole, solid, modes))
     rows = None
     if count is not None:
         rows = scatter_rows([] if whole is None else [whole], count, solver.local_mesh, comm)
@@ -96,6 +96,19 @@ def solve(
         result.evidence,
         {**solver.seconds, **result.seconds},
     )
+
+
+def _columns(block: Array | None, solid: Solid | None, modes: int) -> int | None:
+    """Number of initial modes, once they fit the solid and suffice."""
+    if block is None:
+        return None
+    assert solid is not None
+    rows, count = block.shape
+    if rows != solid.n_dofs:
+        raise UserError(f"initial modes of {rows:,} unknowns, expected {solid.n_dofs:,}")
+    if count < modes:
+        raise UserError(f"{count} initial modes, {modes} are wanted; start from as many")
+    return count
 
 
 def _with_material(model: HexMesh | Solid | None, material: str | Array | None) -> Solid:
