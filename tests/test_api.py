@@ -162,6 +162,7 @@ MISTAKES = [
     (lambda bar: ca.solve(bar.solid, modes=10**6), "ask for fewer or raise the resolution"),
     (lambda bar: ca.solve(bar.solid, seed=-1), "seed: found -1, expected at least 0"),
     (lambda bar: ca.solve(bar.solid, initial=5), "found 5, expected a solution or the path"),
+    (lambda bar: ca.Material.named(None), "there is no material None, only "),
     (lambda bar: ca.solve("builtin:bar", resolution=8, initial=bar), "modes of another mesh"),
     (lambda bar: ca.solve(bar.solid, modes=40, initial=bar), "initial modes, 40 are wanted"),
     (lambda _: ca.load_mesh("builtin:bar").hexahedra("8"), "resolution '8': expected a whole"),

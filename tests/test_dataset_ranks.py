@@ -107,7 +107,7 @@ def test_a_mistake_of_the_program_on_one_rank_ends_all_with_its_traceback(path, 
 @pytest.mark.parametrize(
     ("program", "more", "sentence"),
     [
-        ("dataset_gen", ("--low", "-1"), "expected 0 or above"),
+        ("dataset_gen", ("--low", "-1"), "expected at least 0 GPa"),
         ("dataset_gen", ("--workers", 2), "ask for more ranks instead"),
         ("carillon", ("--shard", 2), "carillon generate: shard 2 of 1"),
     ],

@@ -44,10 +44,10 @@ def test_every_parameter_of_the_training_is_passed_on():
     [
         (
             {"distributions": ["uniform"], "ranges": {"log-uniform": [1, 2]}},
-            "dataset.ranges: 'log-uniform' is not among the distributions uniform",
+            "dataset.ranges.log-uniform: 'log-uniform' is not among the distributions uniform",
         ),
-        ({"ranges": {"log-uniform": [0, 2]}}, "dataset.ranges: "),
-        ({"ranges": {"uniform": [3, 2]}}, "dataset.ranges: "),
+        ({"ranges": {"log-uniform": [0, 2]}}, "dataset.ranges.log-uniform: "),
+        ({"ranges": {"uniform": [3, 2]}}, "dataset.ranges.uniform: "),
         ({"samples": 100, "shards": 51}, "dataset.shards: 50 samples of a distribution"),
     ],
 )

@@ -71,6 +71,7 @@ def solve(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
     >>> mesh = hexmesh_from_voxels(voxelize(builtin_surface("bar"), 12))
     >>> solution = solve(mesh, "uniform", modes=10, method="slepc")

@@ -54,8 +54,8 @@ def named_material(name: str) -> NamedMaterial:
     >>> named_material("steel").young
     200000000000.0
     """
-    if name not in _TABLE:
-        close = difflib.get_close_matches(name, MATERIALS, n=1)
+    if not isinstance(name, str) or name not in _TABLE:
+        close = difflib.get_close_matches(str(name), MATERIALS, n=1)
         hint = f"; did you mean {close[0]}?" if close else ""
         raise UserError(f"there is no material {name!r}, only {', '.join(MATERIALS)}{hint}")
     return _TABLE[name]
