@@ -821,16 +821,11 @@ def _modes_of(solution: Solution | str | Path) -> ModesFile:
 
 
 def _start(initial: Solution, solid: Solid | None) -> Array | None:
+    from solver.files.initial_modes import require_same_mesh
+
     assert solid is not None
     file = _modes_of(initial)
-    there, here = file.mesh, solid.mesh
-    if not (
-        np.array_equal(there.node_grid, here.node_grid) and np.array_equal(there.cells, here.cells)
-    ):
-        raise UserError(
-            f"initial: modes of another mesh ({there.n_nodes:,} nodes), expected the one to solve "
-            f"({here.n_nodes:,} nodes) with any material"
-        )
+    require_same_mesh("initial", file.mesh.node_grid, file.mesh.cells, solid.mesh)
     return file.modes
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
+from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
 from carillon.files.datasets import INTEGER, find, finite, read
 from carillon.files.hdf5 import open_h5
@@ -45,12 +46,7 @@ def modes_from_file(
             count = int(modes_there.shape[1])
             for first in range(0, count, COLUMNS):
                 finite(file, "modes", modes_there[:, first : first + COLUMNS])
-        mesh = model.mesh
-        if not (np.array_equal(grid, mesh.node_grid) and np.array_equal(cells, mesh.cells)):
-            raise UserError(
-                f"{path}: modes of another mesh ({len(grid):,} nodes), expected the one to solve "
-                f"({model.mesh.n_nodes:,} nodes) with any material"
-            )
+        require_same_mesh(str(path), grid, cells, model.mesh)
         if count < modes:
             raise UserError(
                 f"{path}: holds {count} modes, {modes} are wanted; start from a file with as many"
@@ -59,6 +55,15 @@ def modes_from_file(
 
     count = bcast_from_root(comm, check)
     return scatter_rows(_read_columns(path, count), count, local_mesh, comm)
+
+
+def require_same_mesh(name: str, grid: Index, cells: Index, mesh: HexMesh) -> None:
+    """Raise UserError unless the nodes (n, 3) and cells (m, 8) of modes are those of a mesh."""
+    if not (np.array_equal(grid, mesh.node_grid) and np.array_equal(cells, mesh.cells)):
+        raise UserError(
+            f"{name}: modes of another mesh ({len(grid):,} nodes), expected the one to solve "
+            f"({mesh.n_nodes:,} nodes) with any material"
+        )
 
 
 def _read_columns(path: str | Path, count: int) -> Iterator[Array]:
