@@ -16,7 +16,7 @@ LONGER = {"dataset_gen": {"inspect": "inspect-shard"}, "forests": {"inspect": "i
 """Names of commands of a room that another room has too."""
 STUDY = "study"
 REMOVED = {"calibrate": "which is gone: the constants of the objective calibrated are kept"}
-"""What became of commands of earlier versions."""
+"""Commands of earlier versions that are gone, with a sentence on what became of each."""
 
 
 def commands() -> dict[str, Command]:

@@ -220,7 +220,7 @@ class Solution:
     solid: Solid | None
     """The solid, with the material that was solved; None on other ranks than 0."""
     evidence: dict[str, Any] = field(default_factory=dict)
-    """What the solver did and achieved."""
+    """Plain values by name: method, iterations, residuals reached and seconds of each phase."""
 
     @property
     def mesh(self) -> HexMesh:

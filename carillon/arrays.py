@@ -25,6 +25,6 @@ Table = TypeVar("Table", bound=NDArray[Any])
 
 
 def frozen(table: Table) -> Table:
-    """The same array, which cannot be written to any more."""
+    """Make an array read-only, and return it."""
     table.setflags(write=False)
     return table

@@ -40,7 +40,7 @@ class Inside:
     """(nx, ny, nz) int8: axis whose lines the surface crosses most often in a voxel, as it does
     face on."""
     pieces: tuple[Pieces, Pieces, Pieces]
-    """Of the lines along x, y and z."""
+    """Pieces of lattice lines that lie inside, for the lines along x, y and z."""
     sheet: bool = False
     """Whether the surface is open and goes around nothing."""
 

@@ -154,7 +154,7 @@ def connected(count: int, left: Index, right: Index) -> Index:
 
 @dataclass(frozen=True)
 class ClosedPart:
-    """What of a surface is closed by itself."""
+    """Triangles of a surface that enclose a volume by themselves."""
 
     triangles: Index
     """Its triangles (k,)."""
