@@ -29,12 +29,12 @@ class Command:
     success; its docstring is the command's description, `EXAMPLES` ends its help. If it has the
     name `FURTHER`, arguments that it does not know are in `arguments.further`, in their order."""
     summary: str
-    """What it does, for the list of commands."""
+    """One line of the list of commands: what the command does."""
     ranks: bool = False
     """Whether it may be started on several MPI ranks."""
     room: str = ""
     in_room: str = ""
-    """Of a study's command: the room that lists it, too, and its name there if that is another."""
+    """Room that lists the command of a study, too, and the name there if that is another."""
 
 
 def run_room(room: str, description: str, words: Sequence[str] | None = None) -> int:

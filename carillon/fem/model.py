@@ -77,7 +77,7 @@ class Solid(ABC):
 
     @abstractmethod
     def with_young(self, young: Array) -> Self:
-        """The same solid with other moduli [Pa], see `element_moduli`."""
+        """Copy of the solid with other Young's moduli [Pa], see `element_moduli`."""
 
     def with_constants(
         self, poisson: float, density: float, damping: Damping | None = None
