@@ -155,9 +155,9 @@ def _new_column(file: h5py.File, name: str, count: int) -> h5py.Dataset:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[h5py.File, Settings]]:
-    """An open shard of the right shape, and its settings."""
-    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+def _opened(path: Path, checked: bool = False) -> Iterator[tuple[h5py.File, Settings]]:
+    """An open shard of the right shape, and its settings; `checked` if its seal has been before."""
+    with open_h5(path, KIND, SCHEMA, sealed=True, checked=checked) as file:
         try:
             settings = settings_from(file.attrs)
         except (TypeError, ValueError) as error:
@@ -179,31 +179,37 @@ def _opened(path: Path) -> Iterator[tuple[h5py.File, Settings]]:
         yield file, settings
 
 
-def read_settings(path: str | Path) -> Settings:
+def read_settings(path: str | Path, checked: bool = False) -> Settings:
     """Settings of a shard that is complete and undamaged.
 
-    Raises UserError if the file is missing, damaged, or of another kind or schema.
+    `checked`: whether all of it has been checked before. Raises UserError if the file is missing,
+    damaged, or of another kind or schema.
     """
-    with _opened(Path(path)) as (_, settings):
+    with _opened(Path(path), checked) as (_, settings):
         return settings
 
 
-def iterate_shard(
-    path: str | Path, rows: int = PIECE_ROWS, first: int = 0, past: int | None = None
-) -> Iterator[Shard]:
+def iterate_shard(path: str | Path, rows: int = PIECE_ROWS) -> Iterator[Shard]:
     """Read one shard in validated pieces of `rows` samples, in order and in constant memory.
 
-    Each piece is a shard of its own sample range. The whole file is checked before the first one,
-    also if only its samples `first` up to `past`, counted from its own start, are read. Raises
-    UserError if the file is missing, damaged, of another kind or schema, or holds impossible
+    Each piece is a shard of its own sample range. The whole file is checked before the first one.
+    Raises UserError if the file is missing, damaged, of another kind or schema, or holds impossible
     values.
     """
+    count = read_settings(path).count
+    return read_runs(path, [(begin, min(begin + rows, count)) for begin in range(0, count, rows)])
+
+
+def read_runs(path: str | Path, runs: Sequence[tuple[int, int]]) -> Iterator[Shard]:
+    """Read samples of a shard that has been checked, each run as a shard of its own.
+
+    `runs`: first and past-the-last sample of each, counted from the start of the shard. Raises
+    UserError as `iterate_shard` does; of the checksums, only those of what is read are compared.
+    """
     path = Path(path)
-    with _opened(path) as (file, settings):
+    with _opened(path, checked=True) as (file, settings):
         origin = provenance.read(file)
-        end = settings.count if past is None else past
-        for begin in range(first, end, rows):
-            stop = min(begin + rows, end)
+        for begin, stop in runs:
             part = replace(settings, start=settings.start + begin, stop=settings.start + stop)
             columns = {name: file[name][begin:stop] for name in _LONG_NAMES}
             piece = Shard(settings=part, provenance=origin, **columns)

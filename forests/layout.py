@@ -101,6 +101,40 @@ def positions(
     return position
 
 
+def place_nodes(
+    feature: NDArray[np.int32],
+    threshold: Array,
+    left: NDArray[np.int32],
+    right: NDArray[np.int32],
+    leaf: NDArray[np.int32],
+    roots: NDArray[np.int32],
+    levels: int = CLUSTER_LEVELS,
+) -> tuple[Index, NDArray[Any]]:
+    """Position (nodes,) of each node of trees, and the nodes of type `NODE` in this order.
+
+    Raises UserError if there are too many nodes for 32 bits.
+
+    Parameters
+    ----------
+    feature, threshold, left, right, leaf : (nodes,)
+        As in `forests.training.structure.Tree`.
+    roots : (...)
+        Root nodes.
+    """
+    position = positions(left, right, np.unique(roots).astype(np.int64), levels)
+    size = int(position.max()) + 1
+    if size > MOST_NODES:
+        raise UserError(f"forests of {size:,} nodes, expected {MOST_NODES:,} at most; grow fewer")
+    nodes = aligned((size,), NODE)
+    nodes[:] = (np.float32(0.0), np.int32(-1))
+    placed = position >= 0
+    inner, last = np.flatnonzero(placed & (left >= 0)), np.flatnonzero(placed & (left < 0))
+    nodes["threshold"][position[inner]] = rounded_down(threshold[inner])
+    nodes["link"][position[inner]] = position[left[inner]] << FEATURE_BITS | feature[inner]
+    nodes["link"][position[last]] = ~leaf[last]
+    return position, nodes
+
+
 def pack(
     feature: NDArray[np.int32],
     threshold: Array,
@@ -111,39 +145,14 @@ def pack(
     records: NDArray[np.float32],
     levels: int = CLUSTER_LEVELS,
 ) -> tuple[NDArray[np.int32], NDArray[Any], NDArray[np.float32]]:
-    """Bring trees, all in one set of arrays, into the order of `positions`.
+    """Bring trees, all in one set of arrays, and the `records` (leaves, 10) into one order.
 
-    Raises UserError if there are too many nodes for 32 bits.
-
-    Parameters
-    ----------
-    feature, threshold, left, right, leaf : (nodes,)
-        As in `forests.training.structure.Tree`.
-    roots : (...)
-        Root nodes.
-    records : (leaves, 10)
-        One for each leaf.
-
-    Returns
-    -------
-    roots : (...)
-        Where the root nodes are now.
-    nodes : (n,) of type `NODE`
-        In the order of `positions`.
-    records : (leaves, 10)
-        In the order of the nodes.
+    Returns the (...) roots, the nodes of type `NODE`, and the records in the order of the nodes.
+    Raises UserError, see `place_nodes`.
     """
-    position = positions(left, right, np.unique(roots).astype(np.int64), levels)
-    size = int(position.max()) + 1
-    if size > MOST_NODES:
-        raise UserError(f"forests of {size:,} nodes, expected {MOST_NODES:,} at most; grow fewer")
-    nodes = aligned((size,), NODE)
-    nodes[:] = (np.float32(0.0), np.int32(-1))
-    placed = position >= 0
-    inner, last = np.flatnonzero(placed & (left >= 0)), np.flatnonzero(placed & (left < 0))
+    position, nodes = place_nodes(feature, threshold, left, right, leaf, roots, levels)
+    last = np.flatnonzero((position >= 0) & (left < 0))
     last = last[np.argsort(position[last], kind="stable")]
-    nodes["threshold"][position[inner]] = rounded_down(threshold[inner])
-    nodes["link"][position[inner]] = position[left[inner]] << FEATURE_BITS | feature[inner]
     nodes["link"][position[last]] = ~np.arange(len(last))
     ordered = aligned((len(last), records.shape[1]), np.float32)
     ordered[:] = records[leaf[last]]

@@ -117,6 +117,11 @@ def _seal_of(stream: io.BufferedRandom | io.BufferedReader) -> bytes:
     return (_SEAL + digest.hexdigest().encode() + b"\n").ljust(SEAL_BYTES, b"\0")
 
 
+def _begins_with_seal(path: Path) -> bool:
+    with open(path, "rb") as stream:
+        return stream.read(len(_SEAL)) == _SEAL
+
+
 def _is_sealed(path: Path) -> bool:
     """Whether the file begins with a seal; it is read once in a process, unless it changes.
 
@@ -144,17 +149,20 @@ def _is_version_sealed(path: Path, inode: int, size: int, changed: int) -> bool:
 
 
 @contextmanager
-def open_h5(path: str | Path, kind: str, schema: int, sealed: bool = False) -> Iterator[h5py.File]:
+def open_h5(
+    path: str | Path, kind: str, schema: int, sealed: bool = False, checked: bool = False
+) -> Iterator[h5py.File]:
     """Open the HDF5 file `path` for reading and check that it is what it should be.
 
-    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one. What goes
+    A seal is verified if there is one, before HDF5 sees the file; `sealed` demands one. With
+    `checked` its bytes are taken for checked, by whoever shares the work on large files. What goes
     wrong within the body is taken for a fault of the file: do nothing but reading in there. Raises
     UserError if the file is missing, damaged, of another kind, or of another schema version, or its
     content cannot be read as the body tries to.
     """
     path = require_file(path, f"a Carillon {kind} file (HDF5)")
     try:
-        found_seal = _is_sealed(path)
+        found_seal = _begins_with_seal(path) if checked else _is_sealed(path)
         file = _opened(path)
     except OSError as error:
         if error.errno:  # the system's refusal, which says nothing of what the file holds

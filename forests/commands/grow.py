@@ -1,6 +1,7 @@
-"""Grow one tree on shards of training data: its splits, without the answers of its leaves.
+"""Grow one tree on training data: its splits, without the answers of its leaves.
 
-`forests train --structure` takes the trees that such jobs have grown.
+`train --structure` takes the trees that such jobs have grown.  A tree that is too large for one
+machine is grown on several: mpiexec -n RANKS python -m mpi4py -m carillon grow ...
 """
 
 import argparse
@@ -11,10 +12,19 @@ from carillon.errors import UserError
 from carillon.files.paths import require_writable
 from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import Number
-from forests.commands.training import add_training
-from forests.training.dataset import open_dataset
-from forests.training.train import TrainingOptions, grow_trees, parameters_of
+from carillon.processes.ranks import world
+from forests.commands.training import add_training, add_workers, data_of
+from forests.training.dataset import Dataset
+from forests.training.growing import grow_trees
+from forests.training.options import TrainingOptions
+from forests.training.ranks import Ranks
+from forests.training.train import parameters_of
 from forests.training.tree_file import save_tree
+
+EXAMPLES = """examples:
+  grow shards/*.h5 --tree 0 --out trees/0.h5
+  grow --samples 1.25e9 --seed 1 --structure-rows 100000000 --tree 0 --out trees/0.h5
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,18 +32,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_training(parser)
     parser.add_argument("--out", required=True, help="HDF5 file to write")
     parser.add_argument("--tree", type=reader(Number), required=True, help="its number, from 0")
+    add_workers(parser, "threads, of each rank")
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Grow one tree and write it."""
-    require_writable(arguments.out, arguments.datasets)
-    training = collect(TrainingOptions, arguments)
-    job = arguments.tree
-    if job not in training.jobs:
-        raise UserError(f"tree {job} of 2 x {training.trees}: expected 0 to {training.jobs[-1]}")
-    dataset = open_dataset(arguments.datasets)
+    """Grow one tree and write it, together with the other ranks of the job if there are any."""
+    ranks = Ranks(world())
+    training, dataset = ranks.agree(lambda: _opened(arguments, ranks))
     begin = time.perf_counter()
-    tree = grow_trees(dataset, training, training.jobs[job : job + 1])[job]
+    job = arguments.tree
+    ((_, tree),) = grow_trees(dataset, training, [job], ranks, arguments.workers)
+    if not ranks.first:
+        return
     seconds = time.perf_counter() - begin
     save_tree(arguments.out, tree, job, parameters_of(dataset, training), seconds)
-    say(f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}")
+    say(f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}, {seconds:.1f} s")
+
+
+def _opened(arguments: argparse.Namespace, ranks: Ranks) -> tuple[TrainingOptions, Dataset]:
+    require_writable(arguments.out, arguments.datasets)
+    training = collect(TrainingOptions, arguments)
+    if arguments.tree not in training.jobs:
+        raise UserError(
+            f"tree {arguments.tree} of 2 x {training.trees}: expected 0 to {training.jobs[-1]}"
+        )
+    return training, data_of(arguments, ranks)

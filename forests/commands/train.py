@@ -1,5 +1,6 @@
-"""Train both forests on shards of training data, and write them to a file.
+"""Train both forests on training data, and write them to a file.
 
+What is done is kept beside that file: the same command goes on where a killed one ended.
 On several ranks the forests are the same: mpiexec -n RANKS python -m mpi4py -m carillon train ...
 """
 
@@ -7,18 +8,21 @@ import argparse
 
 from carillon.command_line.progress import say
 from carillon.files.paths import require_writable
-from carillon.parameters.command_line import collect
+from carillon.parameters.command_line import collect, reader
+from carillon.parameters.quantities import Positive
 from carillon.processes.ranks import world
-from forests.commands.training import add_training, add_workers
+from forests.commands.training import add_training, add_workers, data_of
 from forests.model import save_model
-from forests.training.dataset import Dataset, open_dataset
+from forests.training.dataset import Dataset
+from forests.training.kept import Kept
+from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
-from forests.training.structure import Tree
-from forests.training.train import TrainingOptions, model_of, parameters_of, train_trees
+from forests.training.train import Grown, model_of, parameters_of, train_trees
 from forests.training.tree_file import load_trees
 
 EXAMPLES = """examples:
   train shards/*.h5 --workers 2 --out forests.h5
+  train --samples 1e6 --seed 1 --workers 2 --out forests.h5
   train shards/*.h5 --structure trees/*.h5 --out forests.h5
 """
 
@@ -30,16 +34,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--structure", nargs="+", metavar="TREE", help="all trees, made by grow with equal options"
     )
+    parser.add_argument(
+        "--keep-minutes",
+        type=reader(Positive),
+        default=5.0,
+        metavar="MINUTES",
+        help="time between two times that what is known of the leaves is kept (default 5)",
+    )
     add_workers(parser, "threads, of each rank")
 
 
-Grown = tuple[dict[int, Tree], float]
-
-
-def _opened(arguments: argparse.Namespace) -> tuple[TrainingOptions, Dataset, Grown | None]:
+def _opened(
+    arguments: argparse.Namespace, ranks: Ranks
+) -> tuple[TrainingOptions, Dataset, Grown | None]:
     require_writable(arguments.out, [*arguments.datasets, *(arguments.structure or [])])
-    training = collect(TrainingOptions, arguments)
-    dataset = open_dataset(arguments.datasets)
+    training, dataset = collect(TrainingOptions, arguments), data_of(arguments, ranks)
     if arguments.structure is None:
         return training, dataset, None
     return training, dataset, load_trees(arguments.structure, parameters_of(dataset, training))
@@ -48,12 +57,23 @@ def _opened(arguments: argparse.Namespace) -> tuple[TrainingOptions, Dataset, Gr
 def run(arguments: argparse.Namespace) -> None:
     """Train and write the model, together with the other ranks of the job if there are any."""
     ranks = Ranks(world())
-    training, dataset, grown = ranks.agree(lambda: _opened(arguments))
-    trained = train_trees(dataset, training, ranks, arguments.workers, grown=grown)
-    if trained is None:
-        return
-    model = model_of(dataset, training, trained)
-    save_model(arguments.out, model)
+    training, dataset, grown = ranks.agree(lambda: _opened(arguments, ranks))
+    with ranks.held(arguments.out):
+        kept = Kept(arguments.out, parameters_of(dataset, training))
+        trained = train_trees(
+            dataset,
+            training,
+            ranks,
+            arguments.workers,
+            grown=grown,
+            kept=kept,
+            keep_seconds=60.0 * arguments.keep_minutes,
+        )
+        if trained is None:
+            return
+        model = model_of(dataset, training, trained)
+        save_model(arguments.out, model)
+        kept.remove()
     facts = trained.facts
     scores = "".join(f", {name} {value:.4g}" for name, value in model.scores.items())
     say(

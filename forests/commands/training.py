@@ -2,17 +2,43 @@
 
 import argparse
 
-from carillon.parameters.command_line import add_options, reader
+from carillon.errors import UserError
+from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.quantities import Workers
-from forests.training.train import TrainingOptions
+from forests.training.dataset import Dataset, made_dataset, open_dataset
+from forests.training.made import SampleOptions
+from forests.training.options import TrainingOptions
+from forests.training.ranks import Ranks
 
 
 def add_training(parser: argparse.ArgumentParser) -> None:
-    """Add the shards and the parameters of a training to a command."""
-    parser.add_argument("datasets", nargs="+", metavar="DATASET", help="shards of dataset_gen")
-    add_options(parser, TrainingOptions)
+    """Add the training data and the parameters of a training to a command."""
+    parser.add_argument("datasets", nargs="*", metavar="DATASET", help="shards of dataset_gen")
+    parser.add_argument(
+        "--checked",
+        action="store_true",
+        help="whether all bytes of the shards have been checked since they were written (inspect)",
+    )
+    add_options(parser.add_argument_group("samples without shards"), SampleOptions)
+    add_options(parser.add_argument_group("training"), TrainingOptions)
 
 
 def add_workers(parser: argparse.ArgumentParser, meaning: str = "threads") -> None:
     """Add the number of threads of a training to a command."""
     parser.add_argument("--workers", type=reader(Workers), default=1, help=meaning)
+
+
+def data_of(arguments: argparse.Namespace, ranks: Ranks) -> Dataset:
+    """The training data that a command names: shards, each checked by one rank, or samples.
+
+    Raises UserError if there are none, or they cannot be used.
+    """
+    if arguments.datasets and arguments.samples is not None:
+        raise UserError(
+            f"found {len(arguments.datasets)} shards and --samples {arguments.samples}, expected "
+            "one of both"
+        )
+    if arguments.datasets:
+        own = slice(0, 0) if arguments.checked else slice(ranks.rank, None, ranks.size)
+        return open_dataset(arguments.datasets, own)
+    return made_dataset(collect(SampleOptions, arguments).parts(arguments.seed))

@@ -1,7 +1,8 @@
-"""Fitted samples as the training sees them: numbered through all shards, read in pieces.
+"""Fitted samples as the training sees them: numbered in one row, read or made in pieces.
 
 A sample's position in the dataset depends on its seed, distribution and number, not on the shards
-that it was split over. So what is held out, and what the splits are chosen from, does not either.
+that it was split over, nor on whether there are any. So what is held out, and what the splits are
+chosen from, does not either.
 """
 
 from __future__ import annotations
@@ -17,10 +18,16 @@ import numpy as np
 from carillon.arrays import Array, Flags, Index
 from dataset_gen.sampling import HYPERCUBE
 from dataset_gen.settings import Settings
-from dataset_gen.shards import PIECE_ROWS, Shard, in_order, iterate_shard, read_settings
+from dataset_gen.shards import Shard, in_order, read_runs, read_settings, shard_of
+from dataset_gen.tasks import TASK_ROWS, ShardPlan
+from dataset_gen.tasks import rows_of as rows_of_task
 from forests.scaling import TRANSFORMS, Features, prepare
 from forests.training.structure import Rows
 
+BLOCK_CUBES = 16
+"""Hypercubes that are read or made together."""
+BLOCK = BLOCK_CUBES * HYPERCUBE
+"""Samples of a block."""
 HELD_OUT = 20
 """Every so many-th sample is not trained on but scores the model..."""
 MOST_HELD_OUT = 100_000
@@ -37,13 +44,15 @@ class Samples(NamedTuple):
     moduli: Array
     position: Index
 
-    def where(self, chosen: Flags) -> Samples:
-        """The chosen (n,) ones."""
+    def where(self, chosen: Flags | Index) -> Samples:
+        """The chosen ones: flags (n,), or numbers."""
         return Samples(self.young[chosen], self.moduli[chosen], self.position[chosen])
 
 
-Reader = Callable[[int, int], Iterator[Shard]]
-"""Pieces of one shard from one of its samples up to another, both counted from its start."""
+Run = tuple[int, int]
+"""First and past-the-last of samples that follow on each other."""
+Reader = Callable[[Sequence[Run]], Iterator[Shard]]
+"""Pieces of runs of samples of one shard, in order; the samples are counted from its start."""
 
 
 @dataclass(frozen=True)
@@ -69,36 +78,43 @@ class Dataset:
         """Poisson's ratio of the fits."""
         return self.settings[0].poisson
 
-    def read(self, begin: int, end: int) -> Iterator[Samples]:
-        """Pieces of the converged samples at positions begin..end-1."""
+    def read(self, runs: Sequence[Run]) -> Iterator[Samples]:
+        """Pieces of the converged samples at positions of ascending runs, in order."""
         for number, reader in enumerate(self.readers):
-            offset = self.first[number]
-            start = max(begin, offset) - offset
-            stop = min(end, self.first[number + 1]) - offset
-            if start < stop:
-                for piece in reader(start, stop):
-                    position = np.arange(piece.start, piece.stop)
-                    position += offset - self.settings[number].start
-                    yield Samples(piece.fine, piece.coarse, position).where(piece.converged)
+            first, past = self.first[number : number + 2]
+            own = [(max(begin, first) - first, min(end, past) - first) for begin, end in runs]
+            own = [(begin, end) for begin, end in own if begin < end]
+            for piece in reader(own) if own else ():
+                position = np.arange(piece.start, piece.stop)
+                position += first - self.settings[number].start
+                yield Samples(piece.fine, piece.coarse, position).where(piece.converged)
 
     def is_held_out(self, position: Index) -> Flags:
         """Which samples (n,) are not trained on: evenly spread, at most `MOST_HELD_OUT`."""
         every = max(HELD_OUT, -(-self.count // MOST_HELD_OUT))
         return np.asarray(position % every == every - 1)
 
-    def training(self, begin: int, end: int) -> Iterator[Samples]:
-        """Pieces of the samples at positions begin..end-1 that are trained on."""
-        for piece in self.read(begin, end):
-            yield piece.where(~self.is_held_out(piece.position))
+    def learned(self, runs: Sequence[Run]) -> Samples:
+        """The samples at positions of ascending runs that are trained on."""
+        return joined(piece.where(~self.is_held_out(piece.position)) for piece in self.read(runs))
 
-    def subset(self, samples: int) -> Samples:
-        """About so many of the samples that are trained on: whole hypercubes, evenly spread."""
+    def spread(self, samples: int) -> list[list[Run]]:
+        """Runs of about so many samples, evenly spread: whole hypercubes, some to a block."""
         cubes = -(-self.count // HYPERCUBE)
         number = min(cubes, max(1, -(-samples // HYPERCUBE)))
         chosen = (np.arange(number) * cubes + cubes // 2) // number
-        runs = np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1)
-        bounds = [(run[0] * HYPERCUBE, (run[-1] + 1) * HYPERCUBE) for run in runs]
-        return joined(piece for run in bounds for piece in self.training(*map(int, run)))
+        return [
+            [(run[0] * HYPERCUBE, (run[-1] + 1) * HYPERCUBE) for run in _consecutive(block)]
+            for block in np.split(chosen, range(BLOCK_CUBES, number, BLOCK_CUBES))
+        ]
+
+    def blocks(self) -> range:
+        """First positions of all blocks of `BLOCK` samples; the last one may have fewer."""
+        return range(0, self.count, BLOCK)
+
+    def subset(self, samples: int) -> Samples:
+        """About so many of the samples that are trained on, evenly spread."""
+        return joined(self.learned(runs) for runs in self.spread(samples))
 
     def thinned(self, samples: int) -> Dataset:
         """About so many samples: the first ones of every shard, in proportion."""
@@ -107,6 +123,11 @@ class Dataset:
         return _dataset(
             [(replace(part, stop=part.start + count), reader) for part, count, reader in pairs]
         )
+
+
+def _consecutive(numbers: Index) -> list[list[int]]:
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    return [[int(number) for number in run] for run in runs]
 
 
 def joined(pieces: Iterable[Samples]) -> Samples:
@@ -125,19 +146,37 @@ def _dataset(ordered: Sequence[tuple[Settings, Reader]]) -> Dataset:
     )
 
 
-def open_dataset(paths: Sequence[str | Path]) -> Dataset:
-    """The shards at `paths`, each checked whole, as one dataset.
+def open_dataset(paths: Sequence[str | Path], own: slice = slice(None)) -> Dataset:
+    """The shards at `paths` as one dataset.
 
-    Raises UserError if there is none, one is missing or damaged, or they do not belong together.
+    `own`: those whose bytes are checked against their checksums, once; all, unless ranks share
+    them, or another job of the same run does it. What is read of the others is still checked piece
+    by piece, as HDF5 stores checksums too. Raises UserError if there is none, one is missing or
+    damaged, or they do not belong together.
     """
-    all_settings = [read_settings(path) for path in paths]
+    for path in paths[own]:
+        read_settings(path)
+    all_settings = [read_settings(path, checked=True) for path in paths]
     return _dataset(
-        [(settings, _reader_of(path)) for path, settings in in_order(paths, all_settings)]
+        [(settings, partial(read_runs, path)) for path, settings in in_order(paths, all_settings)]
     )
 
 
-def _reader_of(path: str | Path) -> Reader:
-    return lambda first, past: iterate_shard(path, PIECE_ROWS, first, past)
+def made_dataset(parts: Sequence[Settings]) -> Dataset:
+    """Samples that are drawn and fitted where they are used, and never stored.
+
+    Raises UserError if the parts do not belong together.
+    """
+    names = [f"part {number}" for number in range(len(parts))]
+    return _dataset([(part, partial(_made, part)) for _, part in in_order(names, parts)])
+
+
+def _made(settings: Settings, runs: Sequence[Run]) -> Iterator[Shard]:
+    for first, past in runs:
+        for begin in range(settings.start + first, settings.start + past, TASK_ROWS):
+            end = min(begin + TASK_ROWS, settings.start + past)
+            part = replace(settings, start=begin, stop=end)
+            yield shard_of(part, rows_of_task(ShardPlan(part).work(0)), {})
 
 
 def dataset_of(shards: Sequence[Shard]) -> Dataset:
@@ -148,12 +187,11 @@ def dataset_of(shards: Sequence[Shard]) -> Dataset:
     names = [f"shard {number}" for number in range(len(shards))]
     ordered = in_order(names, [shard.settings for shard in shards])
     by_name = dict(zip(names, shards, strict=True))
-    return _dataset([(settings, partial(_slices, by_name[str(n)])) for n, settings in ordered])
+    return _dataset([(settings, partial(_parts, by_name[str(n)])) for n, settings in ordered])
 
 
-def _slices(shard: Shard, first: int, past: int) -> Iterator[Shard]:
-    for begin in range(first, past, PIECE_ROWS):
-        yield shard.part(begin, min(begin + PIECE_ROWS, past))
+def _parts(shard: Shard, runs: Sequence[Run]) -> Iterator[Shard]:
+    return (shard.part(begin, end) for begin, end in runs)
 
 
 def is_uniform(young: Array) -> Flags:

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from forests.layout import pack
+from forests.layout import FEATURE_BITS, FEATURE_MASK, pack, place_nodes
 from forests.model import Forests
 from forests.scaling import FEATURES, PATTERNS, Features
+from forests.training.exact_sums import Sums
 from forests.training.moments import ENTRIES, WEIGHT, solve
 from forests.training.structure import Rows, Tree
 
@@ -24,6 +26,8 @@ THIN = 10
 """Rows below which a leaf takes the bounds of its answers from an ancestor."""
 ANCESTOR_ROWS = 64
 """Rows of the ancestor that a leaf leans on, at least."""
+GROUP = 16
+"""Rows that walk down a tree together."""
 
 
 @dataclass(frozen=True)
@@ -37,110 +41,87 @@ class Leaves:
     """(leaves,) range of the targets seen in the leaf, which bounds its answers."""
 
 
-@dataclass(frozen=True)
-class Sums:
-    """What the rows seen so far mean for each leaf or node."""
+class PackedTree(NamedTuple):
+    """A tree that rows walk down fast: its nodes as those of the trained forests."""
 
-    moments: Array
-    """(n, 45) see `moments`."""
-    rows: Index
-    """(n,) how many."""
-    low: Array
-    high: Array
-    """(n,) range of their targets."""
+    roots: NDArray[np.int32]
+    """(128,) see `forests.training.structure.Tree`."""
+    thresholds: NDArray[np.float32]
+    links: NDArray[np.int32]
+    """(nodes, 2) the thresholds in column 0, the links in column 1, see `forests.layout.NODE`."""
 
-    @classmethod
-    def nothing(cls, count: int) -> Sums:
-        """Sums over no rows."""
-        return cls(
-            np.zeros((count, ENTRIES)),
-            np.zeros(count, dtype=np.int64),
-            np.full(count, np.inf),
-            np.full(count, -np.inf),
-        )
+
+def packed(tree: Tree) -> PackedTree:
+    """Bring a tree's nodes into the order in which rows come to them.
+
+    Raises UserError if there are too many.
+    """
+    position, nodes = place_nodes(
+        tree.feature, tree.threshold, tree.left, tree.right, tree.leaf, tree.roots
+    )
+    return PackedTree(
+        position[tree.roots].astype(np.int32),
+        nodes.view(np.float32).reshape(-1, 2),
+        nodes.view(np.int32).reshape(-1, 2),
+    )
 
 
 @numba.njit(cache=True, nogil=True)
 def find_leaves(
     features: Features,
-    pattern: NDArray[np.uint8],
-    feature: NDArray[np.int32],
-    threshold: Array,
-    left: NDArray[np.int32],
-    right: NDArray[np.int32],
-    leaf: NDArray[np.int32],
+    pattern: NDArray[np.unsignedinteger[Any]],
     roots: NDArray[np.int32],
+    thresholds: NDArray[np.float32],
+    links: NDArray[np.int32],
 ) -> NDArray[np.int32]:
-    """Leaf number (n,) of each row (n, 7) float32 with its void pattern (n,)."""
+    """Leaf number (n,) of each row (n, 7 at least) float32 with its void pattern (n,).
+
+    Rows walk in groups, so that the processor waits for the memory of all of them at once.
+    """
     leaf_numbers = np.empty(len(features), dtype=np.int32)
-    for row in range(len(features)):
-        node = roots[pattern[row]]
-        while left[node] >= 0:
-            go_left = features[row, feature[node]] <= threshold[node]
-            node = left[node] if go_left else right[node]
-        leaf_numbers[row] = leaf[node]
+    node = np.empty(GROUP, dtype=np.int64)
+    for first in range(0, len(features), GROUP):
+        rows = min(GROUP, len(features) - first)
+        for row in range(rows):
+            node[row] = roots[pattern[first + row]]
+        walking = rows
+        while walking > 0:
+            walking = 0
+            for row in range(rows):
+                link = links[node[row], 1]
+                if link >= 0:
+                    value = features[first + row, link & FEATURE_MASK]
+                    node[row] = (link >> FEATURE_BITS) + (value > thresholds[node[row], 0])
+                    walking += 1
+        for row in range(rows):
+            leaf_numbers[first + row] = ~links[node[row], 1]
     return leaf_numbers
 
 
-def leaf_of(tree: Tree, features: Features, pattern: NDArray[np.uint8]) -> NDArray[np.int32]:
-    """Leaf number (n,) of each row (n, 7) float32 with its void pattern (n,)."""
-    return np.asarray(
-        find_leaves(
-            features,
-            pattern,
-            tree.feature,
-            tree.threshold,
-            tree.left,
-            tree.right,
-            tree.leaf,
-            tree.roots,
-        )
-    )
+def leaf_of(
+    tree: Tree | PackedTree, features: Features, pattern: NDArray[np.unsignedinteger[Any]]
+) -> NDArray[np.int32]:
+    """Leaf number (n,) of each row (n, 7 at least) float32 with its void pattern (n,)."""
+    walked = tree if isinstance(tree, PackedTree) else packed(tree)
+    return np.asarray(find_leaves(features, pattern, *walked))
 
 
-@numba.njit(cache=True, nogil=True)
-def _accumulate(
-    features: Features,
-    target: Array,
-    weight: Array,
-    leaf_numbers: NDArray[np.int32],
-    moments: Array,
-    rows: Index,
-    low: Array,
-    high: Array,
-) -> None:
-    values = np.empty(FEATURES + 2)
-    for row in range(len(leaf_numbers)):
-        leaf = leaf_numbers[row]
-        for k in range(FEATURES):
-            values[k] = features[row, k]
-        values[FEATURES] = 1.0
-        values[FEATURES + 1] = target[row]
-        sums = moments[leaf]
-        entry = 0
-        for i in range(FEATURES + 2):
-            scaled = weight[row] * values[i]
-            for j in range(i + 1):
-                sums[entry] += scaled * values[j]
-                entry += 1
-        rows[leaf] += 1
-        low[leaf] = min(low[leaf], target[row])
-        high[leaf] = max(high[leaf], target[row])
+def add_rows(sums: Sums, tree: Tree | PackedTree, rows: Rows) -> None:
+    """Add rows to the sums of a tree's leaves.
 
-
-def add_rows(sums: Sums, tree: Tree, rows: Rows) -> None:
-    """Add rows to the sums of a tree's leaves."""
+    Raises UserError, see `Sums.add`.
+    """
     leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
-    _accumulate(
-        rows.features,
-        rows.target,
-        rows.weight,
-        leaf_numbers,
-        sums.moments,
-        sums.rows,
-        sums.low,
-        sums.high,
-    )
+    sums.add(leaf_numbers, rows.features, rows.target, rows.weight)
+
+
+class _NodeSums(NamedTuple):
+    """Sums over the rows below each node: see `Sums`, moments (nodes, 45) as numbers."""
+
+    moments: Array
+    rows: Index
+    low: Array
+    high: Array
 
 
 @numba.njit(cache=True)
@@ -155,15 +136,21 @@ def _gather(parent: Index, moments: Array, rows: Index, low: Array, high: Array)
             high[above] = max(high[above], high[node])
 
 
-def _over_nodes(tree: Tree, sums: Sums) -> tuple[Sums, Index]:
+def _over_nodes(tree: Tree, sums: Sums) -> tuple[_NodeSums, Index]:
     """Sums over the rows below each node, and the parent (nodes,) of each, -1 for roots."""
-    nodes = Sums.nothing(len(tree.left))
-    last, inner = tree.left < 0, np.flatnonzero(tree.left >= 0)
-    for name in ("moments", "rows", "low", "high"):
-        getattr(nodes, name)[last] = getattr(sums, name)
-    parent = np.full(len(tree.left), -1)
+    count, last = len(tree.left), tree.left < 0
+    nodes = _NodeSums(
+        np.zeros((count, ENTRIES)),
+        np.zeros(count, dtype=np.int64),
+        np.full(count, np.inf),
+        np.full(count, -np.inf),
+    )
+    for name, values in zip(_NodeSums._fields, (sums.values(), sums.rows, sums.low, sums.high)):
+        getattr(nodes, name)[last] = values
+    inner = np.flatnonzero(~last)
+    parent = np.full(count, -1)
     parent[tree.left[inner]] = parent[tree.right[inner]] = inner
-    _gather(parent, nodes.moments, nodes.rows, nodes.low, nodes.high)
+    _gather(parent, *nodes)
     return nodes, parent
 
 

@@ -1,38 +1,86 @@
-"""Trees whose splits are chosen for what their leaves hold: linear functions.
+"""Splits that are chosen for what leaves hold: linear functions.
 
 A regression tree of scikit-learn takes the split that leaves the least variance, as if its leaves
 were constant, and so spends most splits on trends that a linear leaf follows anyway. Here a split
-is the one that leaves the least error of two linear fits. Each void pattern, seen from the origin,
-has a root of its own; splits are made where they gain most until the leaves are used up.
+is the one that leaves the least error of two linear fits.
+
+A split depends on the rows of its node, on their order in the dataset, and on the node's key. So it
+is the same wherever the node is grown, and whichever nodes are grown before it.
 """
 
-from heapq import heappop, heappush
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Index
-from forests.scaling import FEATURES, Features
+from carillon.arrays import Array
+from forests.scaling import FEATURES
 from forests.training.moments import ENTRIES, fit_errors, products
 
 BINS = 16
 """Candidate thresholds of a feature, plus one: quantiles of rows drawn from the node."""
 QUANTILE_ROWS = 512
-
+"""Rows that the quantiles are taken from."""
 SPLIT_ROWS = 3000
-"""Rows at most that a split is chosen from, drawn evenly from the node."""
+"""Rows at most that a split is chosen from, one at random from each of as many equal parts."""
+TARGET, WEIGHT = FEATURES, FEATURES + 1
+RECORD = FEATURES + 2
+"""Numbers of a row: seven features, target, weight; float32."""
+NODE = np.dtype(
+    [
+        *(("feature", np.int32), ("left", np.int32), ("threshold", float)),
+        *(("start", np.int64), ("stop", np.int64), ("level", np.int64)),
+        *(("gain", float), ("least", float), ("key", np.uint64)),
+    ]
+)
+"""A node while it grows: its split, and `left` child or -1, the right one follows on that; its rows
+start..stop-1; splits above it; what the split gains, 0 if there is none; the least gain of it and
+all nodes above; the key that its random numbers come from."""
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_ONE, _TWO = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+_SHIFTS = tuple(np.uint64(n) for n in (30, 27, 31, 11))
+_UNIT = 2.0**-53
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def derived(key: np.uint64, number: int) -> np.uint64:
+    """Key number `number` that follows from a key (SplitMix64)."""
+    z = key + (np.uint64(number) + np.uint64(1)) * _GOLDEN
+    z = (z ^ (z >> _SHIFTS[0])) * _ONE
+    z = (z ^ (z >> _SHIFTS[1])) * _TWO
+    return z ^ (z >> _SHIFTS[2])
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _uniform(key: np.uint64, number: int) -> float:
+    """Random number `number` of a key, in 0..1."""
+    return float(derived(key, number) >> _SHIFTS[3]) * _UNIT
 
 
 @numba.njit(cache=True, nogil=True)
-def _thresholds(
-    features: Features, rows: Index, generator: np.random.Generator, edges: Array, values: Array
-) -> None:
+def _draw(records: NDArray[np.float32], key: np.uint64, drawn: NDArray[np.float32]) -> int:
+    """Write the rows that a split is chosen from; how many they are."""
+    used = min(len(records), len(drawn))
+    if used == len(records):
+        drawn[:used] = records
+        return used
+    step = len(records) / used
+    for q in range(used):
+        row = min(int((q + _uniform(key, q)) * step), len(records) - 1)
+        drawn[q] = records[row]
+    return used
+
+
+@numba.njit(cache=True, nogil=True)
+def _thresholds(rows: NDArray[np.float32], key: np.uint64, edges: Array, values: Array) -> None:
     """Quantiles (7, BINS - 1) of rows drawn at random; infinite where there are no more."""
     drawn = min(len(rows), QUANTILE_ROWS)
+    number = SPLIT_ROWS
     for k in range(FEATURES):
         for q in range(drawn):
-            values[q] = features[rows[int(generator.random() * len(rows))], k]
+            values[q] = rows[int(_uniform(key, number) * len(rows)), k]
+            number += 1
         ordered = np.sort(values[:drawn])
         count = 0
         for b in range(1, BINS):
@@ -45,50 +93,42 @@ def _thresholds(
 
 
 @numba.njit(cache=True, nogil=True)
-def _mean_row(features: Features, target: Array, rows: Index, used: int, centre: Array) -> None:
-    centre[:] = 0.0
-    step = len(rows) / used
-    for q in range(used):
-        row = rows[int(q * step)]
-        for k in range(FEATURES):
-            centre[k] += features[row, k]
-        centre[FEATURES] += target[row]
-    centre /= used
-
-
-@numba.njit(cache=True, nogil=True)
 def _best_split(
-    features: Features,
-    target: Array,
-    weight: Array,
-    rows: Index,
-    min_leaf: int,
-    generator: np.random.Generator,
+    records: NDArray[np.float32],
+    key: np.uint64,
+    min_leaf: float,
+    drawn: NDArray[np.float32],
+    sums: Array,
+    sides: Array,
 ) -> tuple[int, float, float]:
-    """Feature, threshold and gain of the best split of a node's rows; feature -1 if none gains."""
-    used = min(len(rows), SPLIT_ROWS)
-    step = len(rows) / used
-    centre = np.empty(FEATURES + 1)
-    _mean_row(features, target, rows, used, centre)
+    """Feature, threshold and gain of the best split of a node's rows; feature -1 if none gains.
+
+    The last three arrays are room to work in.
+    """
+    used = _draw(records, key, drawn)
+    rows = drawn[:used]
+    step = len(records) / used
+    centre = np.zeros(FEATURES + 1)
+    for q in range(used):
+        for k in range(FEATURES + 1):
+            centre[k] += rows[q, k]
+    centre /= used
     edges = np.empty((FEATURES, BINS - 1))
-    _thresholds(features, rows, generator, edges, np.empty(QUANTILE_ROWS))
-    sums = np.zeros((FEATURES, BINS, ENTRIES))
+    _thresholds(rows, key, edges, np.empty(QUANTILE_ROWS))
+    sums[:] = 0.0
     count = np.zeros((FEATURES, BINS), dtype=np.int64)
     values, one = np.empty(FEATURES + 2), np.empty(ENTRIES)
     for q in range(used):
-        row = rows[int(q * step)]
-        products(features[row], target[row], weight[row], centre, values, one)
+        products(rows[q], float(rows[q, TARGET]), float(rows[q, WEIGHT]), centre, values, one)
         for k in range(FEATURES):
             chosen = 0
             for b in range(BINS - 1):
-                chosen += features[row, k] > edges[k, b]
+                chosen += rows[q, k] > edges[k, b]
             for entry in range(ENTRIES):
                 sums[k, chosen, entry] += one[entry]
             count[k, chosen] += 1
-    whole = sums[0].sum(axis=0)
     # Of the node, and of both sides of every split in turn.
-    sides = np.empty((1 + 2 * FEATURES * (BINS - 1), ENTRIES))
-    sides[0] = whole
+    sides[0] = sums[0].sum(axis=0)
     splits, found = np.empty((FEATURES * (BINS - 1), 2), dtype=np.int64), 0
     for k in range(FEATURES):
         below, rows_below = np.zeros(ENTRIES), 0
@@ -100,7 +140,7 @@ def _best_split(
             if min(rows_below, used - rows_below) * step >= min_leaf:
                 splits[found, 0], splits[found, 1] = k, b
                 sides[1 + 2 * found] = below
-                sides[2 + 2 * found] = whole - below
+                sides[2 + 2 * found] = sides[0] - below
                 found += 1
     errors = fit_errors(sides[: 1 + 2 * found])
     best, best_feature, best_threshold = 0.0, -1, 0.0
@@ -113,80 +153,107 @@ def _best_split(
 
 
 @numba.njit(cache=True, nogil=True)
-def _divide(column: NDArray[np.float32], threshold: float, rows: Index) -> int:
-    """Bring the rows that go left to the front; how many they are."""
-    first, last = 0, len(rows) - 1
-    while first <= last:
-        if column[rows[first]] <= threshold:
-            first += 1
+def _divide(
+    records: NDArray[np.float32],
+    places: NDArray[np.uint32],
+    feature: int,
+    threshold: float,
+    spare: NDArray[np.float32],
+    spare_places: NDArray[np.uint32],
+) -> int:
+    """Bring the rows that go left to the front, both sides in their order; how many go left."""
+    kept, moved = 0, 0
+    for row in range(len(records)):
+        if records[row, feature] <= threshold:
+            if kept < row:
+                records[kept] = records[row]
+                places[kept] = places[row]
+            kept += 1
         else:
-            rows[first], rows[last] = rows[last], rows[first]
-            last -= 1
-    return first
+            spare[moved] = records[row]
+            spare_places[moved] = places[row]
+            moved += 1
+    records[kept:] = spare[:moved]
+    places[kept:] = spare_places[:moved]
+    return kept
 
 
 @numba.njit(cache=True, nogil=True)
-def grow_linear(
-    features: Features,
-    target: Array,
-    weight: Array,
-    rows: Index,
-    starts: Index,
-    max_leaves: int,
-    min_leaf: int,
+def grow_nodes(
+    records: NDArray[np.float32],
+    places: NDArray[np.uint32],
+    nodes: NDArray[Any],
+    count: int,
+    least: float,
+    fewest: int,
+    min_leaf: float,
     depth: int,
-    generator: np.random.Generator,
-) -> tuple[NDArray[np.int32], Array, NDArray[np.int32], NDArray[np.int32]]:
-    """Grow one tree with a root for each group of rows.
+    fresh: bool,
+) -> int:
+    """Split nodes, and those that come of them, until no split is left that may be made.
 
     Parameters
     ----------
-    features : (n, 7) float32
-        Of all rows.
-    target, weight : (n,)
-        Of all rows.
-    rows, starts
-        Group g has the rows `rows[starts[g]:starts[g + 1]]`, in random order; `rows` is reordered.
-    max_leaves, min_leaf, depth
-        Leaves in all, rows a leaf needs, splits from root to leaf.
-    generator
-        Draws the thresholds that are tried.
+    records : (n, 9) float32
+        Rows, see `RECORD`; brought into the order of the nodes, with their `places` (n,).
+    nodes : of type `NODE`
+        The first `count` are there; there must be room for two more for every split.
+    least
+        Least gain that a node and all above it must have to be split.
+    fewest
+        Rows that a node must have to be split.
+    min_leaf, depth
+        Rows that a leaf needs, splits from the root.
+    fresh
+        Whether the splits of the first `count` nodes are still to be chosen.
 
     Returns
     -------
-    feature, threshold, left, right : (nodes,)
-        Splits; group g has root g, leaves have `left` -1.
+    count : int
+        Nodes that are there; `-count` if there was no room for more.
     """
-    roots = len(starts) - 1
-    size = roots + 2 * max(0, min(max_leaves, len(rows)) - roots)
-    feature, threshold = np.zeros(size, dtype=np.int32), np.zeros(size)
-    left, right = np.full(size, -1, dtype=np.int32), np.full(size, -1, dtype=np.int32)
-    start, stop = np.zeros(size, dtype=np.int64), np.zeros(size, dtype=np.int64)
-    level = np.zeros(size, dtype=np.int64)
-    start[:roots], stop[:roots] = starts[:-1], starts[1:]
-    candidates = [(0.0, 0) for _ in range(0)]
-    first_new, nodes, leaves = 0, roots, roots
-    while True:
-        for node in range(first_new, nodes):
-            own = rows[start[node] : stop[node]]
-            if level[node] < depth and len(own) >= 2 * min_leaf:
-                k, at, gain = _best_split(features, target, weight, own, min_leaf, generator)
-                if k >= 0:
-                    feature[node], threshold[node] = k, at
-                    heappush(candidates, (-gain, node))
-        first_new = nodes
-        if len(candidates) == 0 or leaves >= max_leaves:
-            break
-        _, node = heappop(candidates)
-        own = rows[start[node] : stop[node]]
-        middle = start[node] + _divide(features[:, feature[node]], threshold[node], own)
-        left[node], right[node] = nodes, nodes + 1
-        start[nodes], stop[nodes] = start[node], middle
-        start[nodes + 1], stop[nodes + 1] = middle, stop[node]
-        level[nodes] = level[nodes + 1] = level[node] + 1
-        nodes += 2
-        leaves += 1
-    for node in range(nodes):
-        if left[node] < 0:
-            feature[node], threshold[node] = 0, 0.0
-    return feature[:nodes], threshold[:nodes], left[:nodes], right[:nodes]
+    drawn = np.empty((SPLIT_ROWS, RECORD), dtype=np.float32)
+    sums = np.empty((FEATURES, BINS, ENTRIES))
+    sides = np.empty((1 + 2 * FEATURES * (BINS - 1), ENTRIES))
+    spare, spare_places = np.empty_like(records), np.empty_like(places)
+    chosen = 0 if fresh else count
+    node = 0
+    while node < count:
+        while chosen < count:
+            new = nodes[chosen]
+            own = records[new.start : new.stop]
+            new.gain = 0.0
+            if new.level < depth and len(own) >= 2 * min_leaf:
+                feature, threshold, gain = _best_split(own, new.key, min_leaf, drawn, sums, sides)
+                if feature >= 0:
+                    new.feature, new.threshold, new.gain = feature, threshold, gain
+            new.least = min(new.least, new.gain)
+            chosen += 1
+        here = nodes[node]
+        node += 1
+        size = here.stop - here.start
+        if here.left >= 0 or here.gain <= 0.0 or here.least < least or size < fewest:
+            continue
+        if count + 2 > len(nodes):
+            return -count
+        middle = here.start + _divide(
+            records[here.start : here.stop],
+            places[here.start : here.stop],
+            here.feature,
+            here.threshold,
+            spare,
+            spare_places,
+        )
+        if min(middle - here.start, here.stop - middle) < min_leaf:
+            here.gain = here.least = 0.0  # the drawn rows promised more
+            continue
+        here.left = count
+        for side in range(2):
+            child = nodes[count]
+            child.feature, child.threshold, child.left = 0, 0.0, -1
+            child.start = here.start if side == 0 else middle
+            child.stop = middle if side == 0 else here.stop
+            child.level, child.least = here.level + 1, here.least
+            child.key = derived(here.key, side)
+            count += 1
+    return count

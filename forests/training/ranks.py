@@ -1,13 +1,20 @@
 """The ranks that train one model together, or one process alone."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import numpy as np
+
 from carillon.errors import UserError, on_all_ranks
-from dataset_gen.shards import PIECE_ROWS
-from forests.training.leaves import Sums
+from carillon.files.locks import locked
+from forests.training.exact_sums import Sums
 
 T = TypeVar("T")
+
+MESSAGE_BYTES = 1 << 27
+"""Length of a message of sums, about; MPI counts in 32 bits."""
 
 
 class Ranks:
@@ -23,22 +30,21 @@ class Ranks:
         """Whether this rank writes the result and speaks for all."""
         return self.rank == 0
 
-    def own_jobs(self, jobs: range) -> range:
-        """This rank's share of independent jobs, one after the other to all ranks."""
-        return jobs[self.rank :: self.size]
+    def own(self, items: Sequence[T]) -> Sequence[T]:
+        """This rank's share of independent items: every so-manieth, so that all advance alike."""
+        return items[self.rank :: self.size]
 
-    def own_samples(self, samples: int) -> tuple[int, int]:
-        """First and past-the-last position of this rank's samples: whole pieces, in order."""
-        pieces = -(-samples // PIECE_ROWS)
-        begin, end = (pieces * (self.rank + k) // self.size * PIECE_ROWS for k in (0, 1))
-        return min(begin, samples), min(end, samples)
+    def from_one(self, value: T, rank: int = 0) -> T:
+        """The value of one rank, on every rank."""
+        return value if self._comm is None else cast(T, self._comm.bcast(value, rank))
 
-    def together(self, mine: dict[int, T]) -> dict[int, T]:
-        """What all ranks have, on every rank."""
-        if self._comm is None:
-            return mine
-        parts: list[dict[int, T]] = self._comm.allgather(mine)
-        return {key: value for part in parts for key, value in part.items()}
+    def total(self, count: int) -> int:
+        """Sum over all ranks, on every rank."""
+        return count if self._comm is None else int(self._comm.allreduce(count))
+
+    def exchanged(self, parts: list[T]) -> list[T]:
+        """What every rank has for this one, in their order; `parts`: what this one has for them."""
+        return parts if self._comm is None else cast(list[T], self._comm.alltoall(parts))
 
     def in_order(self, mine: list[T]) -> list[T]:
         """The lists of all ranks one after the other, on the first rank; its own elsewhere."""
@@ -48,18 +54,32 @@ class Ranks:
         return mine if parts is None else [item for part in parts for item in part]
 
     def add_up(self, sums: Sums) -> None:
-        """Add the sums of all ranks on the first one."""
+        """Add the sums of all ranks on the first one; those of the others are nothing then."""
         if self._comm is None:
             return
         from mpi4py import MPI
 
-        names = {"moments": MPI.SUM, "rows": MPI.SUM, "low": MPI.MIN, "high": MPI.MAX}
-        for name, operation in names.items():
-            values = getattr(sums, name)
+        sums.carry()
+        operations = {"low": MPI.MIN, "high": MPI.MAX}
+        for name, values in sums.arrays():
+            for part in np.array_split(values, max(1, values.nbytes // MESSAGE_BYTES)):
+                operation = operations.get(name, MPI.SUM)
+                if self.first:
+                    self._comm.Reduce(MPI.IN_PLACE, part, operation)
+                else:
+                    self._comm.Reduce(part, None, operation)
+        if not self.first:
+            sums.clear()
+
+    @contextmanager
+    def held(self, path: str | Path) -> Iterator[None]:
+        """Hold a result for this job alone, see `carillon.files.locks.locked`."""
+        with ExitStack() as stack:
             if self.first:
-                self._comm.Reduce(MPI.IN_PLACE, values, operation)
+                self.agree(lambda: stack.enter_context(locked(path)))
             else:
-                self._comm.Reduce(values, None, operation)
+                self.agree(lambda: None)
+            yield
 
     def agree(self, action: Callable[[], T]) -> T:
         """The result of `action`, which refuses its input on every rank if it does on any of them.

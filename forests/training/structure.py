@@ -1,18 +1,14 @@
-"""First step of the training (section 7.1.3): where a tree splits, from a subset of the rows."""
+"""Splits of a tree, limits of its growth, and the rows that it is grown from."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array
-from forests.scaling import FEATURES, PATTERNS, Features
-from forests.training.linear_splits import grow_linear
-
-SPLIT_FEATURES = 5
-"""Features that a split of the grower `best` chooses from, so that its trees differ."""
+from forests.scaling import PATTERNS, Features
 
 
 @dataclass(frozen=True)
@@ -67,6 +63,12 @@ class Rows:
         return len(self.target)
 
 
+def rows_together(parts: Sequence[Rows]) -> Rows:
+    """Several parts as one; there must be one."""
+    names = [field.name for field in fields(Rows)]
+    return Rows(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
 def tree_of(
     feature: NDArray[Any],
     threshold: Array,
@@ -84,60 +86,3 @@ def tree_of(
         leaf=np.where(last, np.cumsum(last) - 1, -1).astype(np.int32),
         roots=roots.astype(np.int32),
     )
-
-
-def flatten(tree: Any) -> Tree:
-    """Arrays of a fitted scikit-learn tree (its `tree_`), one root for all void patterns."""
-    return tree_of(
-        tree.feature, tree.threshold, tree.children_left, tree.children_right, np.zeros(PATTERNS)
-    )
-
-
-def _by_variance(kind: str, split_features: int) -> Callable[..., Tree]:
-    """Grower by scikit-learn's estimator of that name, whose splits leave the least variance."""
-
-    def grow(rows: Rows, limits: TreeLimits, seed: int) -> Tree:
-        from sklearn import tree  # whose import takes a second, and only training has use of it
-
-        estimator = getattr(tree, kind)(
-            max_depth=limits.depth,
-            max_leaf_nodes=max(2, limits.max_leaves),
-            min_samples_leaf=limits.min_leaf,
-            max_features=split_features,
-            random_state=seed,
-        )
-        estimator.fit(rows.features, rows.target, sample_weight=rows.weight)
-        return flatten(estimator.tree_)
-
-    return grow
-
-
-def _by_linear_fit(rows: Rows, limits: TreeLimits, seed: int) -> Tree:
-    """Grower whose splits leave the least error of linear leaves, see `linear_splits`."""
-    generator = np.random.default_rng(seed)
-    order = generator.permutation(len(rows))
-    order = order[np.argsort(rows.pattern[order], kind="stable")]
-    present, starts = np.unique(rows.pattern[order], return_index=True)
-    splits = grow_linear(
-        rows.features,
-        rows.target,
-        rows.weight,
-        order,
-        np.append(starts, len(rows)),
-        limits.max_leaves,
-        limits.min_leaf,
-        limits.depth,
-        generator,
-    )
-    # A pattern without rows takes the root of the one that differs from it in the fewest cells.
-    bits = np.arange(PATTERNS)[:, None] >> np.arange(FEATURES) & 1
-    differing = (bits[:, None] != bits[present]).sum(axis=2)
-    return tree_of(*splits, roots=differing.argmin(axis=1))
-
-
-GROWERS: dict[str, Callable[[Rows, TreeLimits, int], Tree]] = {
-    "linear": _by_linear_fit,
-    "best": _by_variance("DecisionTreeRegressor", SPLIT_FEATURES),
-    "extra": _by_variance("ExtraTreeRegressor", FEATURES),
-}
-"""Ways to grow trees; `best` is that of the paper and of random forests."""

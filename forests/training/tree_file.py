@@ -35,6 +35,22 @@ def save_tree(
         provenance.write(file, parameters)
 
 
+def load_tree(path: str | Path, parameters: dict[str, Any]) -> tuple[int, Tree, float]:
+    """Number and splits of a tree, and the seconds that growing it took.
+
+    Raises UserError if the file is missing, damaged or of another training.
+    """
+    with open_h5(path, KIND, SCHEMA, sealed=True) as file:
+        job, seconds = int(file.attrs["tree"]), float(file.attrs["seconds"])
+        theirs = json.loads(str(file.attrs["parameters"]))
+        kinds = {field.name: INTEGER for field in fields(Tree)} | {"threshold": REAL}
+        tree = Tree(**{name: read(file, name, (None,), kind) for name, kind in kinds.items()})
+    if theirs != json.loads(json.dumps(parameters)):
+        raise UserError(f"{path}: {difference(theirs, parameters)}")
+    _require_sound(path, tree)
+    return job, tree, seconds
+
+
 def load_trees(
     paths: Sequence[str | Path], parameters: dict[str, Any]
 ) -> tuple[dict[int, Tree], float]:
@@ -43,22 +59,14 @@ def load_trees(
     Raises UserError if a file is missing, damaged or of another training, or the trees are not each
     there once.
     """
-    expected = json.dumps(parameters, sort_keys=True)
     trees: dict[int, Tree] = {}
     seconds = 0.0
     for path in paths:
-        with open_h5(path, KIND, SCHEMA, sealed=True) as file:
-            job = int(file.attrs["tree"])
-            seconds += float(file.attrs["seconds"])
-            theirs = str(file.attrs["parameters"])
-            kinds = {field.name: INTEGER for field in fields(Tree)} | {"threshold": REAL}
-            tree = Tree(**{name: read(file, name, (None,), kind) for name, kind in kinds.items()})
-        if theirs != expected:
-            raise UserError(f"{path}: {_difference(json.loads(theirs), json.loads(expected))}")
+        job, tree, took = load_tree(path, parameters)
         if job in trees:
             raise UserError(f"{path}: is tree {job}, which another file holds too")
-        _require_sound(path, tree)
         trees[job] = tree
+        seconds += took
     numbers = set(range(2 * parameters["trees"]))
     if missing := sorted(numbers - set(trees)):
         raise UserError(
@@ -68,7 +76,9 @@ def load_trees(
     return trees, seconds
 
 
-def _difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:
+def difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:
+    """What the parameters of two trainings differ in, in words."""
+    expected = json.loads(json.dumps(expected))
     name = next(key for key in expected | theirs if theirs.get(key) != expected.get(key))
     if name == "samples":
         return "was grown on other shards; name the same ones, or grow it again"

@@ -1,0 +1,121 @@
+"""What a training has worked out so far, beside the file that it will write.
+
+A training that was killed goes on from there: from the trees that were grown, and from the sums of
+the leaves over the samples that were added.
+"""
+
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from carillon.errors import UserError
+from carillon.files.datasets import INTEGER, REAL, read
+from carillon.files.hdf5 import create_h5, open_h5
+from forests.training.dataset import Samples
+from forests.training.exact_sums import Sums
+from forests.training.leaf_fit import LeafSums
+from forests.training.structure import Tree
+from forests.training.tree_file import difference, load_tree, save_tree
+
+KIND = "leaf sums"
+SCHEMA = 1
+
+
+def folder_of(out: str | Path) -> Path:
+    """Folder with what is kept of the training that writes `out`."""
+    path = Path(out)
+    return path.parent / f".{path.name}.training"
+
+
+class Kept:
+    """Trees and sums of one training with certain parameters, in a folder beside its result."""
+
+    def __init__(self, out: str | Path, parameters: dict[str, Any]) -> None:
+        self.folder = folder_of(out)
+        self._parameters = parameters
+
+    def _tree(self, job: int) -> Path:
+        return self.folder / f"tree-{job}.h5"
+
+    @property
+    def _sums(self) -> Path:
+        return self.folder / "sums.h5"
+
+    def trees(self, jobs: range) -> tuple[dict[int, Tree], float]:
+        """Trees that are there, by number, and the seconds that growing them took.
+
+        Raises UserError if they are damaged or were grown with other parameters.
+        """
+        trees, seconds = {}, 0.0
+        for job in jobs:
+            if self._tree(job).exists():
+                with self._explained():
+                    _, trees[job], took = load_tree(self._tree(job), self._parameters)
+                seconds += took
+        return trees, seconds
+
+    def keep_tree(self, job: int, tree: Tree, seconds: float) -> None:
+        """Write a tree that was grown."""
+        self.folder.mkdir(exist_ok=True)
+        save_tree(self._tree(job), tree, job, self._parameters, seconds)
+
+    def keep_sums(self, state: LeafSums) -> None:
+        """Write what is known of the leaves; what was there before is replaced at the end."""
+        self.folder.mkdir(exist_ok=True)
+        with create_h5(self._sums, KIND, SCHEMA, sealed=True) as file:
+            file.attrs["parameters"] = json.dumps(self._parameters, sort_keys=True)
+            for name in ("samples", "used", "seconds"):
+                file.attrs[name] = getattr(state, name)
+            for name, values in state.held_out._asdict().items():
+                file[f"held_out/{name}"] = values
+            for job, sums in state.sums.items():
+                sums.carry()
+                for name, values in sums.arrays():
+                    file[f"{job}/{name}"] = values
+
+    def sums(self, nothing: LeafSums) -> LeafSums:
+        """What was kept of the leaves, written into sums over nothing; these if there is nothing.
+
+        Raises UserError if it is damaged or was worked out with other parameters.
+        """
+        if not self._sums.exists():
+            return nothing
+        with self._explained(), open_h5(self._sums, KIND, SCHEMA, sealed=True) as file:
+            theirs = json.loads(file.attrs["parameters"])
+            if theirs != self._parameters:
+                raise UserError(f"{self._sums}: {difference(theirs, self._parameters)}")
+            shapes = {"young": (None, 8), "moduli": (None, 8), "position": (None,)}
+            held_out = {
+                name: read(file["held_out"], name, shape, INTEGER if name == "position" else REAL)
+                for name, shape in shapes.items()
+            }
+            for job, sums in nothing.sums.items():
+                _fill(file[str(job)], sums)
+            samples, used, seconds = (file.attrs[n] for n in ("samples", "used", "seconds"))
+        return LeafSums(nothing.sums, Samples(**held_out), int(samples), int(used), float(seconds))
+
+    def remove(self) -> None:
+        """Remove all that was kept."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except UserError as error:
+            raise UserError(
+                f"{error}, or remove {self.folder} to begin again, or choose another name"
+            ) from None
+
+
+def _fill(group: Any, sums: Sums) -> None:
+    for name, values in sums.arrays():
+        if group[name].shape != values.shape:
+            raise UserError(
+                f"{group.file.filename}: {name} has shape {group[name].shape}, expected "
+                f"{values.shape}"
+            )
+        group[name].read_direct(values)

@@ -1,0 +1,165 @@
+"""Second step of the training (section 7.1.3): sums over all samples, block by block.
+
+Blocks are shared among ranks and threads. They may be added in any order, since the sums are exact;
+after every slice of blocks all ranks have added the same share, and what is known can be kept.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from threading import Lock
+
+import numpy as np
+
+from carillon.command_line.progress import track
+from forests.scaling import is_logarithmic
+from forests.training.blocks import WINDOW, in_order
+from forests.training.dataset import BLOCK, STUDIED, Dataset, Samples, joined, rows_of
+from forests.training.exact_sums import Sums, bits_of
+from forests.training.leaves import leaf_of, packed
+from forests.training.options import TrainingOptions
+from forests.training.ranks import Ranks
+from forests.training.structure import Tree
+
+SLICE_BLOCKS = 32
+"""Blocks of a rank between two points at which all ranks have done the same share."""
+SAVE_SECONDS = 300.0
+"""Time between two times that sums are kept."""
+COSTLY = 20.0
+"""Times as long as keeping them took, at least."""
+
+
+@dataclass
+class LeafSums:
+    """What is known of the leaves after the first blocks of a dataset."""
+
+    sums: dict[int, Sums]
+    """By tree number."""
+    held_out: Samples = field(default_factory=lambda: joined([]))
+    """Samples that were not trained on, in order."""
+    samples: int = 0
+    """Samples of the blocks done."""
+    used: int = 0
+    """Samples trained on."""
+    seconds: float = 0.0
+    """Wall time that it took."""
+
+
+Keep = Callable[[LeafSums], None]
+
+
+def sums_of(trees: dict[int, Tree], training: TrainingOptions) -> LeafSums:
+    """Sums over no samples."""
+    logarithmic = training.transform == STUDIED[1] or (
+        training.transform not in STUDIED and is_logarithmic(training.transform)
+    )
+    bits = bits_of(logarithmic, training.uniform_weight)
+    return LeafSums({job: Sums.nothing(tree.leaves, bits) for job, tree in trees.items()})
+
+
+def add_samples(
+    state: LeafSums,
+    dataset: Dataset,
+    training: TrainingOptions,
+    trees: dict[int, Tree],
+    ranks: Ranks,
+    workers: int = 1,
+    progress: bool = True,
+    keep: Keep | None = None,
+    keep_seconds: float = SAVE_SECONDS,
+) -> None:
+    """Add all samples that a state lacks, on all ranks; the state of the first one is the result.
+
+    Parameters
+    ----------
+    state
+        What an earlier run knew, on the first rank; nothing on the others.
+    keep
+        Called on the first rank with what is known, about every `keep_seconds`.
+    """
+    begin, before = time.monotonic(), state.seconds
+    done = ranks.from_one(state.samples)
+    adding = _Adding(state, dataset, training, trees)
+    blocks = [start for start in dataset.blocks() if start >= done]
+    length = SLICE_BLOCKS * ranks.size
+    kept, cost = begin, 0.0
+
+    def added() -> Iterator[int]:
+        nonlocal kept, cost
+        with ThreadPoolExecutor(workers) as pool:
+            for first in range(0, len(blocks), length):
+                chosen = ranks.own(blocks[first : first + length])
+                held_out = [state.held_out]
+                for block, samples in in_order(pool, adding.block, chosen, WINDOW * workers):
+                    held_out.append(block)
+                    yield samples * ranks.size
+                state.held_out = joined(held_out)
+                last = blocks[min(first + length, len(blocks)) - 1]
+                state.samples = min(last + BLOCK, dataset.count)
+                due = time.monotonic() - kept > max(keep_seconds, COSTLY * cost)
+                if keep is None or not ranks.from_one(due):
+                    continue
+                _gather(state, ranks)
+                state.seconds = before + time.monotonic() - begin
+                if ranks.first:
+                    start = time.monotonic()
+                    keep(state)
+                    kept = time.monotonic()
+                    cost = kept - start
+
+    shown = progress and ranks.first
+    for _ in track(added(), "fitting leaves", dataset.count, "samples", shown, int, done):
+        pass
+    _gather(state, ranks)
+    state.samples = dataset.count
+    state.seconds = before + time.monotonic() - begin
+
+
+class _Adding:
+    """Adds blocks of samples to sums, several at a time."""
+
+    def __init__(
+        self,
+        state: LeafSums,
+        dataset: Dataset,
+        training: TrainingOptions,
+        trees: dict[int, Tree],
+    ) -> None:
+        self._state, self._dataset, self._training = state, dataset, training
+        self._trees = {job: packed(tree) for job, tree in trees.items()}
+        self._locks = {job: Lock() for job in trees}
+        self._counting = Lock()
+
+    def block(self, begin: int) -> tuple[Samples, int]:
+        """Add the block from a position on: what of it is not trained on, and its length."""
+        end = min(begin + BLOCK, self._dataset.count)
+        samples = joined(self._dataset.read([(begin, end)]))
+        out = self._dataset.is_held_out(samples.position)
+        learned = samples.where(~out)
+        rows = rows_of(learned, self._training.transform, self._training.uniform_weight)
+        # Threads begin with different trees, so that none waits for the others' sums.
+        jobs = list(self._trees)
+        turn = begin // BLOCK % max(1, len(jobs))
+        for job in jobs[turn:] + jobs[:turn]:
+            own = rows[self._training.kind(job)]
+            leaf_numbers = leaf_of(self._trees[job], own.features, own.pattern)
+            with self._locks[job]:
+                sums = self._state.sums[job]
+                sums.add(leaf_numbers, own.features, own.target, own.weight)
+        with self._counting:
+            self._state.used += len(learned.young)
+        return samples.where(out), end - begin
+
+
+def _gather(state: LeafSums, ranks: Ranks) -> None:
+    """Bring what all ranks know to the first one; the others know nothing then."""
+    for sums in state.sums.values():
+        ranks.add_up(sums)
+    parts = ranks.in_order([(state.held_out, state.used)])
+    state.held_out, state.used = joined([]), 0
+    if ranks.first:
+        held_out = joined(part for part, _ in parts)
+        order = np.argsort(held_out.position)
+        state.held_out = held_out.where(order)
+        state.used = sum(used for _, used in parts)

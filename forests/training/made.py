@@ -1,0 +1,96 @@
+"""Samples that a training draws and fits itself: how many, of which moduli, fitted how."""
+
+from typing import Annotated, Any
+
+from carillon.errors import UserError
+from carillon.fem.element import DEFAULT_POISSON
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.quantities import Count, Number, PoissonRatio
+from dataset_gen.objectives import DATASET_OBJECTIVES, DEFAULT_OBJECTIVE
+from dataset_gen.sampling import DISTRIBUTIONS
+from dataset_gen.settings import Settings, ShardOptions, settings_of
+
+
+def whole_number(text: str) -> int:
+    """A count such as 1250000000 or 1.25e9.
+
+    Raises ValueError if it is no whole number.
+
+    Examples
+    --------
+    >>> whole_number("1.25e9"), whole_number("3000")
+    (1250000000, 3000)
+    """
+    try:
+        return int(text)
+    except ValueError:
+        pass
+    try:
+        number = float(text)
+        if number == int(number):
+            return int(number)
+    except (ValueError, OverflowError):
+        pass
+    raise ValueError(f"found {text!r:.60}, expected a whole number such as 3000 or 1.25e9")
+
+
+@parameters
+class SampleOptions:
+    """Samples that are made where they are used, in the place of shards."""
+
+    samples: Count | None = option(
+        None,
+        "samples to make where they are used, in the place of shards, such as 1.25e9; they are the "
+        "ones that generate writes",
+        read=whole_number,
+    )
+    data_seed: Number | None = option(None, "of these samples (that of the splits)")
+    objective: Annotated[str, OneOf(*DATASET_OBJECTIVES)] = option(
+        DEFAULT_OBJECTIVE, "of their fits"
+    )
+    poisson: PoissonRatio = option(DEFAULT_POISSON, "their Poisson's ratio")
+    distributions: tuple[str, ...] = option(
+        ("uniform",),
+        "distributions of their moduli, which share the samples: uniform or log-uniform (default "
+        "uniform), with another range [GPa] as uniform:0:20",
+    )
+
+    def parts(self, seed: int) -> list[Settings]:
+        """Settings of the samples of each distribution, `seed` being that of the splits.
+
+        Raises UserError if there are no samples, a distribution is unknown, or its range is
+        impossible.
+        """
+        if self.samples is None:
+            raise UserError(
+                "no training data: found neither shards nor --samples; name the shards that "
+                "generate has written, or how many samples to make"
+            )
+        share, left = divmod(self.samples, len(self.distributions))
+        return [
+            settings_of(
+                ShardOptions(
+                    share + (number < left),
+                    seed if self.data_seed is None else self.data_seed,
+                    objective=self.objective,
+                    poisson=self.poisson,
+                    **_range_of(words),
+                )
+            )
+            for number, words in enumerate(self.distributions)
+        ]
+
+
+def _range_of(words: str) -> dict[str, Any]:
+    name, *ends = words.split(":")
+    try:
+        low, high = map(float, ends) if ends else (None, None)
+    except ValueError:
+        low = high = None
+        name = words
+    if name not in DISTRIBUTIONS:
+        raise UserError(
+            f"distribution {words!r:.60}: expected {' or '.join(DISTRIBUTIONS)}, or with a range "
+            "in GPa as uniform:0:20"
+        )
+    return {"distribution": name, "low": low, "high": high}

@@ -1,0 +1,46 @@
+"""Parameters of a training."""
+
+from typing import Annotated
+
+from carillon.parameters import OneOf, option, parameters
+from carillon.parameters.quantities import Count, Number, between
+from forests.layout import MOST_LEAVES
+from forests.scaling import TRANSFORMS
+from forests.training.growers import GROWERS
+from forests.training.structure import TreeLimits
+
+
+@parameters
+class TrainingOptions:
+    """Parameters of the training."""
+
+    trees: Annotated[int, between(1, 1000)] = option(3, "of each of the two forests")
+    depth: Annotated[int, between(1, 1000)] = option(20, "of a tree, at most")
+    max_leaves: Annotated[int, between(1, MOST_LEAVES)] = option(
+        30_000, "of a tree, at most; 56 bytes each"
+    )
+    min_leaf: Count = option(30, "rows of the subset that a leaf needs")
+    structure_rows: Count = option(5_000_000, "rows of the subset that splits are chosen from")
+    prior: Annotated[float, between(1e-9, 1e9)] = option(
+        0.5, "rows that the surroundings of a leaf count for in it"
+    )
+    uniform_weight: Annotated[float, between(1e-9, 1e9)] = option(
+        400.0, "weight of blocks of one material; they are few but fill most real objects"
+    )
+    transform: Annotated[str, OneOf(*TRANSFORMS)] = option("log", "of the features and the target")
+    grower: Annotated[str, OneOf(*GROWERS)] = option("linear", "how splits are chosen")
+    seed: Number = option(0, "of the splits")
+
+    @property
+    def limits(self) -> TreeLimits:
+        """What a tree may grow to."""
+        return TreeLimits(self.max_leaves, self.min_leaf, self.depth)
+
+    @property
+    def jobs(self) -> range:
+        """Numbers of all trees: those of the forest of void origins, then the others."""
+        return range(2 * self.trees)
+
+    def kind(self, job: int) -> int:
+        """Forest that a tree belongs to."""
+        return job // self.trees
