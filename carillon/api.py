@@ -769,8 +769,9 @@ def train(
     """
     from forests.model import save_model
     from forests.training.dataset import open_dataset
+    from forests.training.options import TrainingOptions
     from forests.training.ranks import Ranks
-    from forests.training.train import TrainingOptions, model_of, train_trees
+    from forests.training.train import model_of, train_trees
 
     training, dataset = TrainingOptions(**options), open_dataset([str(path) for path in shards])
     trained = train_trees(dataset, training, Ranks(None), checked("workers", workers, Workers))

@@ -11,7 +11,7 @@ import numpy as np
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
 from forests.training.dataset import dataset_of
-from forests.training.train import TrainingOptions
+from forests.training.options import TrainingOptions
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from sound.design.optimise import optimise

@@ -7,8 +7,9 @@ from conftest import Run
 from dataset_gen.shards import Shard
 from forests.model import Model
 from forests.training.dataset import Dataset, dataset_of
+from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
-from forests.training.train import TrainingOptions, model_of, train_trees
+from forests.training.train import model_of, train_trees
 
 
 def train(

@@ -12,8 +12,8 @@ from forests import coarsen, coarsen_with_derivatives
 from forests.layout import pack, positions, rounded_down
 from forests.model import CONSTANT, FILLED, HIGH, LOW, VOID, Model
 from forests.scaling import FEATURES, LOG_FLOOR, LOG_VOID, PATTERNS, TRANSFORMS, prepare
+from forests.training.growers import flatten
 from forests.training.leaves import Leaves, join
-from forests.training.structure import flatten
 from tests.forests_reference import (
     cell_order_reference,
     coarsen_reference,

@@ -20,8 +20,8 @@ from forests.commands.inspect import as_text, describe
 from forests.model import FILLED, HIGH, KIND, LOW, SCHEMA, VOID, Forests
 from forests.scaling import PATTERNS
 from forests.training.leaves import Leaves, join
+from forests.training.options import TrainingOptions
 from forests.training.structure import tree_of
-from forests.training.train import TrainingOptions
 from tests.small_forests import train
 
 TRANSFORMS = ("log", "ratio")

@@ -8,7 +8,7 @@ from dataset_gen.objectives import DEFAULT_OBJECTIVE, fit, lumped_share
 from dataset_gen.settings import ShardOptions
 from forests import coarsen
 from forests.baselines import average, galerkin
-from forests.training.train import TrainingOptions
+from forests.training.options import TrainingOptions
 from tests.dataset_spectra import box_fields, coarse_frequencies, fine_frequencies, rms_error
 from tests.small_forests import train
 

@@ -5,7 +5,7 @@ from dataclasses import fields
 import pytest
 import yaml
 
-from forests.training.train import TrainingOptions
+from forests.training.options import TrainingOptions
 from solver.files.modes_file import read_modes
 from studies.base.table import read_table
 from tests.pages import Page, assert_self_contained

@@ -14,7 +14,7 @@ from carillon.errors import UserError
 from carillon.parameters import REQUIRED
 from carillon.parameters.fields import parameters_of
 from dataset_gen.settings import ShardOptions
-from forests.training.train import TrainingOptions
+from forests.training.options import TrainingOptions
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.response.response_file import StrikeOptions
@@ -219,7 +219,7 @@ LISTS = {
     "discretisation": "solver.analysis.problem:DISCRETISATIONS",
     "fill": "carillon.fem.geometry:FILLS",
     "components": "carillon.fem.geometry:COMPONENTS",
-    "grower": "forests.training.structure:GROWERS",
+    "grower": "forests.training.growers:GROWERS",
     "transform": "forests.scaling:TRANSFORMS",
     "interface": "solver.hcms.condense:INTERFACES",
     "acceleration": "solver.correction.criteria:ACCELERATIONS",

@@ -10,7 +10,7 @@ TRAINING = (
     *("trees", "depth", "max_leaves", "min_leaf", "structure_rows", "prior", "uniform_weight"),
     *("transform", "grower", "seed"),
 )
-"""Options of `forests.training.train.TrainingOptions`, which takes long to load."""
+"""Options of `forests.training.options.TrainingOptions`, which takes long to load."""
 
 
 @dataclass(frozen=True)

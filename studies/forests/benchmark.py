@@ -93,8 +93,8 @@ def _scikit_forests(trees: int, leaves: int) -> tuple[list[Any], Model]:
     """Forests of scikit-learn, one for void and one for filled origins, and the same as a model."""
     from sklearn.ensemble import ExtraTreesRegressor
 
+    from forests.training.growers import flatten
     from forests.training.leaves import Leaves
-    from forests.training.structure import flatten
 
     prepared = prepare(random_blocks(BLOCKS_PER_LEAF * leaves, seed=1), "log")
     generator = np.random.default_rng(0)

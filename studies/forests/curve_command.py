@@ -4,9 +4,9 @@ import argparse
 
 from carillon.command_line.outputs import require_outputs
 from carillon.parameters.command_line import collect
-from forests.commands.training import add_training, add_workers
-from forests.training.dataset import open_dataset
-from forests.training.train import TrainingOptions
+from forests.commands.training import add_training, add_workers, data_of
+from forests.training.options import TrainingOptions
+from forests.training.ranks import Ranks
 from studies.base.command_results import add_outputs, publish
 from studies.forests import training
 
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Train on each number of rows and print the scores."""
     require_outputs(arguments, arguments.datasets)
     how = collect(TrainingOptions, arguments)
-    dataset = open_dataset(arguments.datasets)
+    dataset = data_of(arguments, Ranks())
     counts = training.require_counts(arguments.rows)
     rows = training.learning_curve(dataset, how, counts, arguments.workers)
     if arguments.plot:

@@ -26,10 +26,11 @@ from forests.training.dataset import (
     rows_of,
 )
 from forests.training.leaves import answers_of
+from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
-from forests.training.train import Trained, TrainingOptions, train_trees
+from forests.training.train import Trained, train_trees
 from studies.forests.config import VARIANTS
 
 logger = logging.getLogger(__name__)
@@ -67,7 +68,7 @@ def fresh_samples(dataset: Dataset) -> dict[str, Samples]:
         )
         shard = generate(options, progress=False)
         name = f"{each.distribution} {each.low:g}..{each.high:g} GPa"
-        by_distribution[name] = joined(dataset_of([shard]).read(0, TEST_SAMPLES))
+        by_distribution[name] = joined(dataset_of([shard]).read([(0, TEST_SAMPLES)]))
     return by_distribution
 
 

@@ -4,9 +4,9 @@ import argparse
 
 from carillon.command_line.outputs import require_outputs
 from carillon.parameters.command_line import collect
-from forests.commands.training import add_training, add_workers
-from forests.training.dataset import open_dataset
-from forests.training.train import TrainingOptions
+from forests.commands.training import add_training, add_workers, data_of
+from forests.training.options import TrainingOptions
+from forests.training.ranks import Ranks
 from studies.base.command_results import add_outputs, publish
 from studies.forests import training
 
@@ -24,5 +24,5 @@ def run(arguments: argparse.Namespace) -> None:
     require_outputs(arguments, arguments.datasets)
     how = collect(TrainingOptions, arguments)
     names = arguments.only or tuple(training.VARIANTS)
-    rows = training.variants(open_dataset(arguments.datasets), how, arguments.workers, names)
+    rows = training.variants(data_of(arguments, Ranks()), how, arguments.workers, names)
     publish(arguments, rows, training.as_text(rows), arguments.workers)
