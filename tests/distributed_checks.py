@@ -3,6 +3,7 @@
 Every rank makes the same checks, and one that fails ends them all.
 """
 
+import os
 import sys
 import time
 from collections import Counter
@@ -26,7 +27,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.assembly.sparse import assembled
 from solver.assembly.system import Layout, assemble
-from solver.distribution.collective import receive_arrays, send_arrays
+from solver.distribution.collective import receive_arrays, send_arrays, share_cores
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.files.modes_file import write_modes
 from solver.hcms import schedule as scheduling
@@ -68,6 +69,22 @@ def shares_make_up_the_solid() -> None:
         == model.mesh.n_nodes
         == local_mesh.decomposition.n_nodes
     )
+
+
+def ranks_share_the_cores_they_have_together() -> None:
+    """Bound to the same core or each to one of its own, they have one thread each."""
+    every, own = sorted(os.sched_getaffinity(0)), COMM.rank % os.cpu_count()
+    try:
+        for cores in ({every[0]}, {every[own % len(every)]}, set(every)):
+            os.sched_setaffinity(0, cores)
+            os.environ.pop("OMP_NUM_THREADS", None)
+            together = len(set().union(*COMM.allgather(cores)))
+            threads = share_cores(COMM)
+            assert threads == min(len(cores), max(1, together // COMM.size))
+    finally:
+        os.sched_setaffinity(0, every)
+        os.environ["OMP_NUM_THREADS"] = "1"
+        share_cores(COMM)
 
 
 def products_are_those_of_the_whole_matrices() -> None:

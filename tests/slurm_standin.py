@@ -18,6 +18,7 @@ FAULTS = {
     "forgotten": "jobs that have ended",
     "slow": "the configuration, and accounting that there is not",
     "away": "the first three questions about jobs",
+    "idle": "jobs, which end without having done anything",
 }
 """What SLURM fails to do, by name."""
 
@@ -31,6 +32,12 @@ def install(folder: Path, *faults: str) -> dict[str, str]:
     assert set(faults) <= set(FAULTS)
     path = os.pathsep.join([str(folder), os.environ["PATH"]])
     return {**os.environ, "PATH": path, "STANDIN": f"{folder} {' '.join(faults)}"}
+
+
+def submitted(folder: Path) -> list[list[str]]:
+    """Arguments of every job that was accepted, in order."""
+    files = sorted(folder.glob("*.arguments"), key=lambda file: int(file.stem))
+    return [file.read_text().split("\n") for file in files]
 
 
 def calls(folder: Path, command: str) -> int:
@@ -67,11 +74,12 @@ class Standin:
                 pass
         comment = arguments[arguments.index("--comment") + 1]
         (self.folder / f"{number}.comment").write_text(comment)
+        (self.folder / f"{number}.arguments").write_text("\n".join(arguments))
         (wrapped,) = [word for word in arguments if word.startswith("--wrap=")]
         state = self.folder / f"{number}.state"
         state.write_text("RUNNING")
         script = (
-            f"{wrapped.removeprefix('--wrap=')}\n"
+            f"{'false' if 'idle' in self.faults else wrapped.removeprefix('--wrap=')}\n"
             f"[ $? = 0 ] && echo COMPLETED >'{state}' || echo FAILED >'{state}'\n"
         )
         log = self.folder / f"{number}.log"

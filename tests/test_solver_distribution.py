@@ -11,6 +11,7 @@ pytestmark = pytest.mark.mpi
 PROGRAM = Path(__file__).with_name("distributed_checks.py")
 EVERYWHERE = [
     "shares_make_up_the_solid",
+    "ranks_share_the_cores_they_have_together",
     "products_are_those_of_the_whole_matrices",
     "synthesis_bounds_the_spectrum",
     "shared_merges_are_those_of_one_rank",

@@ -10,6 +10,7 @@ import pytest
 
 from tests.programs import python
 from tests.workflow_runs import CHECKOUT, PROFILE
+from workflow import submission
 
 _IMPORT = re.compile(r"(?m)^(?:from (?:carillon|workflow)|import (?:carillon|workflow))\b.*$")
 
@@ -87,6 +88,39 @@ def test_ranks_get_a_launcher_only_where_there_are_several(printed, ranks):
     config = f"{MODELS}solver: {{ranks: {ranks}, modes: 20}}\n"
     done = printed(config, "results/models/bar/truth.h5")
     assert ("mpiexec -n 2 python" in done.stdout + done.stderr) == (ranks == 2)
+
+
+RANKED = f"{MODELS}solver: {{ranks: 4, cores: 8, modes: 20, launcher: srun}}\n"
+TRUTH = "results/models/bar/truth.h5"
+
+
+def test_threads_of_ranks_are_those_of_the_cores_that_snakemake_has_here(printed):
+    """Two cores for four ranks, which asked for two each."""
+    assert "$(( 2 > 4 ? 2 / 4 : 1 ))" in printed(RANKED, TRUTH).stdout
+
+
+def test_ranks_of_a_job_have_the_threads_asked_for_on_a_small_first_node(printed):
+    job = printed(RANKED, TRUTH, "--mode", "remote").stdout
+    assert "OMP_NUM_THREADS=2 srun -n 4 --cpus-per-task=2 python" in job
+
+
+@pytest.mark.parametrize(("cores", "expected"), [(None, 1), (16, 16)])
+def test_a_job_counts_the_cores_of_the_run_and_not_those_of_its_node(cores, expected, monkeypatch):
+    monkeypatch.setattr("os.environ", {})
+    node = 64
+    assert submission.cores_of_run(node, in_job=True) == 1
+    assert submission.cores_of_run(cores, in_job=False) == expected
+    assert submission.cores_of_run(node, in_job=True) == expected
+
+
+def test_every_try_gets_twice_the_memory_for_each_rank(printed):
+    def memory(attempt: int) -> set[tuple[str, int]]:
+        found = printed(RANKED, TRUTH, "--attempt", attempt).stdout
+        return {(name, int(n)) for name, n in re.findall(r"(mem_mb\w*)=(\d+)", found)}
+
+    first, second = memory(1), memory(2)
+    assert {name for name, _ in first} == {"mem_mb", "mem_mb_per_cpu"}
+    assert second == {(name, 2 * megabytes) for name, megabytes in first}
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
-"""What gets into the job scripts of a cluster beside the rules, and must mean nothing to a shell.
+"""What jobs of a cluster get beside the rules: the number of cores, and what they are started with.
 
 Snakemake hands the command line of a run on to its jobs in double quotes, in which a shell looks
 for `$`, backticks, quotes and backslashes.  Of a configuration that is but the name of its file.
 """
 
+import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,6 +14,24 @@ from carillon.errors import UserError
 
 _SPECIAL = re.compile(r"""["'$`\\\n]""")
 _PLAIN = re.compile(r"[\w@%+=:,./-]*", re.ASCII)
+_CORES = "CARILLON_RUN_CORES"
+
+
+def cores_of_run(cores: int | None, in_job: bool) -> int:
+    """Cores of a run; its jobs on a cluster count the same, whatever the node has that they got.
+
+    Else a job would start more threads than there are cores that were asked for it.
+
+    Parameters
+    ----------
+    cores
+        Cores that Snakemake may use here; None if it was not told, as on a cluster.
+    in_job
+        Whether Snakemake runs in a job of a cluster, with the environment of the run.
+    """
+    count = int(os.environ.get(_CORES, 1)) if in_job else cores or 1
+    os.environ[_CORES] = str(count)
+    return count
 
 
 def require_plain(paths: Iterable[str | Path], given: Mapping[str, Any]) -> None:

@@ -30,12 +30,14 @@ def allowed_threads() -> int:
     return min(cores, int(requested)) if requested.isdigit() and int(requested) > 0 else cores
 
 
-def limit_threads(ranks: int) -> int:
+def limit_threads(ranks: int, cores: int | None = None) -> int:
     """Give this rank its share of the cores, so that ranks x threads never exceed the cores.
 
-    Returns the number of BLAS threads now allowed in this process.
+    `cores` are those that all of the machine's `ranks` may use together; those of this process
+    unless given. Returns the number of BLAS threads now allowed in this process.
     """
-    threads = min(max(1, allowed_cores() // max(1, ranks)), allowed_threads())
+    share = (allowed_cores() if cores is None else cores) // max(1, ranks)
+    threads = min(max(1, share), allowed_threads())
     ThreadpoolController().limit(limits=threads)
     os.environ["OMP_NUM_THREADS"] = str(threads)
     return threads

@@ -14,7 +14,6 @@ from carillon.command_line.progress import say
 from carillon.fem.model import Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.processes.memory import reuse_freed_memory
-from carillon.processes.threads import limit_threads
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.corrected import CorrectedModes, Eigenpairs
@@ -22,7 +21,7 @@ from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import RANDOM, SolverOptions
 from solver.analysis.proof import Phases, ground_truth, prove
 from solver.assembly.system import Layout, System, assemble
-from solver.distribution.collective import bcast_from_root, compute_on_root, ranks_of_machine
+from solver.distribution.collective import bcast_from_root, compute_on_root, share_cores
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.weyl import CountingLaw
@@ -66,7 +65,7 @@ class ModalSolver:
         require_memory(model, options, comm)
         self.comm = comm
         self._verbose = verbose
-        self._threads = limit_threads(ranks_of_machine(comm))
+        self._threads = share_cores(comm)
         leave_cores(comm)
         reuse_freed_memory()
         phases = Phases(comm, verbose)

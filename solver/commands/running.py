@@ -13,9 +13,8 @@ from carillon.files.atomic import atomic_path
 from carillon.parameters.command_line import add_options
 from carillon.processes.blas import warn_about_reference_blas
 from carillon.processes.petsc import PETSc
-from carillon.processes.threads import limit_threads
 from solver.analysis.problem import ProblemOptions
-from solver.distribution.collective import bcast_from_root, ranks_of_machine
+from solver.distribution.collective import bcast_from_root, share_cores
 from solver.linear import petsc_options
 
 INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
@@ -28,7 +27,7 @@ HIDDEN = ("out", "pictures", "json")
 def on_ranks(petsc: str | None = None) -> Iterator[MPI.Comm]:
     """All ranks, with their share of the cores; what PETSc refuses of `petsc` is one sentence."""
     comm = MPI.COMM_WORLD
-    limit_threads(ranks_of_machine(comm))
+    share_cores(comm)
     if comm.rank == 0:
         warn_about_reference_blas()
     try:

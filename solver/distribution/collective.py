@@ -3,6 +3,7 @@
 Arrays travel as contiguous buffers, announced by one short message with their shapes.
 """
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from carillon.command_line.exit_status import meaning
 from carillon.command_line.progress import say
 from carillon.errors import one_line
+from carillon.processes.threads import limit_threads
 
 Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")
@@ -71,6 +73,19 @@ def ranks_of_machine(comm: MPI.Comm) -> int:
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     try:
         return int(machine.size)
+    finally:
+        machine.Free()
+
+
+def share_cores(comm: MPI.Comm) -> int:
+    """Give this rank as many threads as it has cores for itself, and return them; collective.
+
+    A launcher may have bound every rank to cores of its own, or all to the same ones.
+    """
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    try:
+        cores = set[int]().union(*machine.allgather(os.sched_getaffinity(0)))
+        return limit_threads(machine.size, len(cores))
     finally:
         machine.Free()
 

@@ -18,13 +18,12 @@ from mpi4py import MPI
 from carillon.arrays import Array
 from carillon.fem.geometry import Blocks
 from carillon.fem.model import RIGID_MODES, ElasticModel
-from carillon.processes.threads import limit_threads
 from solver.analysis.coarse_start import prolonged
 from solver.analysis.modal_solver import ModalSolver, Prepared
 from solver.analysis.options import RANDOM
 from solver.correction.random_start import Approximation
 from solver.correction.shift import is_amid
-from solver.distribution.collective import ranks_of_machine
+from solver.distribution.collective import share_cores
 from solver.files.initial_modes import scatter_rows
 from solver.linear import Inverse
 from solver.subspace.rayleigh_ritz import SHIFT_FRACTION, rayleigh_ritz
@@ -66,7 +65,7 @@ class InverseIteration:
     """
 
     def __init__(self, fine: ElasticModel | None, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-        threads = limit_threads(ranks_of_machine(comm))
+        threads = share_cores(comm)
         self.prepared = Prepared.of_model(fine, comm)
         self.system = self.prepared.assembled(threads)
         self.inverse: Inverse | None = None

@@ -15,7 +15,7 @@ class JobLimits:
     what: str
     """What the rule makes."""
     memory_mb: int | None
-    """Memory [MB]; None if the rule works it out."""
+    """Memory of a job, or of each rank if it has any [MB]; None if the rule works it out."""
     minutes: int
     """Wall time [min]."""
 
@@ -39,7 +39,8 @@ class LimitsSection:
     """What a run gives a rule in place of the rule's own limits."""
 
     memory_mb: Annotated[int, Ge(1), Le(100_000_000)] | None = option(
-        None, "memory; the rule's own if null [MB]"
+        None,
+        "memory of a job, or of each rank where it has MPI ranks; the rule's own if null [MB]",
     )
     minutes: Annotated[int, Ge(1), Le(1_000_000)] | None = option(
         None, "wall time; the rule's own if null [min]"

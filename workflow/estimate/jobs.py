@@ -70,6 +70,23 @@ def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = Non
     return jobs
 
 
+def requested_memory(resources: Any) -> int | None:
+    """Megabytes that SLURM is asked for by a job on all of its nodes, from Snakemake's resources.
+
+    Examples
+    --------
+    >>> requested_memory({"mem_mb": 900, "mem_mb_per_cpu": 100, "tasks": 3, "cpus_per_task": 4})
+    1200
+    >>> requested_memory({"mem_mb": 900})
+    900
+    """
+    of_core: int | None = resources.get("mem_mb_per_cpu")
+    if of_core:
+        return of_core * int(resources["tasks"]) * int(resources["cpus_per_task"])
+    of_node: int | None = resources.get("mem_mb")
+    return of_node
+
+
 def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
     from snakemake.api import SnakemakeApi
     from snakemake.exceptions import WorkflowError
@@ -96,7 +113,7 @@ def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
                 "model": job.wildcards_dict.get("model", ""),
                 "target": TARGETS[job not in needed],
                 "cores": job.threads,
-                "memory_mb": job.resources.get("mem_mb"),
+                "memory_mb": requested_memory(job.resources),
                 "minutes": job.resources.get("runtime"),
                 "command": job.shellcmd or "",
                 "outputs": list(map(str, job.output)),

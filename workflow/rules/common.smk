@@ -1,9 +1,10 @@
 # Names, folders and helper functions that the other rules share.
 import os
+import shlex
 import sys
 from pathlib import Path
 
-from workflow import locks, training, variants
+from workflow import locks, submission, training, variants
 from workflow.arguments import options, path_word, quoted
 from workflow.sources import fingerprint as source
 
@@ -12,15 +13,18 @@ LOGS = f"{RESULTS}/logs"
 BENCHMARKS = f"{RESULTS}/benchmarks"
 MODELS = list(config["models"])
 
-# Timed rules take all cores, so that no other job disturbs their wall times.
-# On a cluster nothing says how many there are but the configuration.
-ALL_CORES = workflow.resource_settings.cores or 1
+# Timed rules take all cores, so that no other job disturbs their wall times. On a cluster nothing says
+# how many there are but the configuration.
+ALL_CORES = submission.cores_of_run(workflow.resource_settings.cores, workflow.remote_exec)
 SOLVER_CORES = config["solver"]["cores"] or ALL_CORES
 RANKS = config["solver"]["ranks"]
 # Runs whose result is a spectrum go side by side: threads within one leave more of a core idle.
 RUN_CORES = config["solver"]["cores"] or min(ALL_CORES, max(RANKS, ALL_CORES // 4))
 # What starts ranks, in a job of SLURM its own.
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
+LAUNCHER = config["solver"]["launcher"] or ANY_LAUNCHER
+# The executor hides from srun how many cores a rank has; without them it may bind ranks to one.
+TELLS_CORES = workflow.remote_exec and Path(shlex.split(LAUNCHER)[0]).name == "srun"
 
 
 def resources_of(ranks, cores):
@@ -28,18 +32,25 @@ def resources_of(ranks, cores):
 
     The words of `mpi` are quoted here, as it is the one thing that goes to a shell as it is.
     """
-    launcher = quoted(config["solver"]["launcher"] or ANY_LAUNCHER) if ranks > 1 else ""
+    launcher = quoted(LAUNCHER) if ranks > 1 else ""
     return {"mpi": launcher, "tasks": ranks, "cpus_per_task": max(1, cores // ranks)}
 
 
 def python_on(ranks):
     """Python in a shell command; on several ranks one's failure ends them all with -m mpi4py."""
-    return "{resources.mpi} -n {resources.tasks:q} python -m mpi4py" if ranks > 1 else "python"
+    cores = " --cpus-per-task={resources.cpus_per_task:q}" if TELLS_CORES else ""
+    started = "{resources.mpi} -n {resources.tasks:q}" + cores
+    return f"{started} python -m mpi4py" if ranks > 1 else "python"
 
 
 def solver_command(how, program="solver"):
-    """Shell command of the solver on ranks that share the threads of the rule."""
+    """Shell command of the solver on ranks that share the threads of the rule.
+
+    In a job of a cluster Snakemake cuts `threads` to the cores of the first node, although ranks
+    may be on others: each has the cores that were asked for it.
+    """
     threads = "$(( {threads} > {resources.tasks:q} ? {threads} / {resources.tasks:q} : 1 ))"
+    threads = "{resources.cpus_per_task:q}" if workflow.remote_exec else threads
     python = f"OMP_NUM_THREADS={threads} {python_on(RANKS)}"
     return f"{python} -m {program} {how} --out {{output:q}} > {{log:q}} 2>&1"
 
@@ -72,9 +83,9 @@ def tree_memory(plan):
 
 
 def training_memory(plan):
-    """Megabytes for growing trees on every rank, and for 0.4 kB a leaf, 3.8 kB in the tree at work."""
+    """Megabytes of a rank for growing trees, and for 0.4 kB a leaf, 3.8 kB in the tree at work."""
     leaves = plan.forests["max_leaves"] * (2 * plan.forests["trees"] * 0.4 + 3.8) / 1000
-    return plan.forests["ranks"] * (tree_memory(plan) + int(leaves))
+    return tree_memory(plan) + int(leaves)
 
 
 def growing(first):
@@ -85,15 +96,18 @@ def growing(first):
 def limits(rule, memory=None, ranks=None, cores=SOLVER_CORES):
     """Memory and time of a rule from the configuration, and what its ranks need if it has any.
 
-    `memory` [MB] is taken if the configuration names none.
+    `memory` [MB] of one rank, or of the job if it has none, is taken if the configuration names
+    none. Ranks may be on any number of nodes: SLURM is asked for memory by core, since it takes
+    `mem_mb` for that of each node; to Snakemake `mem_mb` is what a job takes in all.
     """
     asked = config["resources"][rule]
-    megabytes, minutes = growing(asked["memory_mb"] or memory), growing(asked["minutes"])
-    return {
-        "mem_mb": megabytes,
-        "runtime": minutes,
-        **(resources_of(ranks, cores) if ranks else {}),
-    }
+    of_rank = asked["memory_mb"] or memory
+    found = {"mem_mb": growing((ranks or 1) * of_rank), "runtime": growing(asked["minutes"])}
+    if ranks:
+        found |= resources_of(ranks, cores)
+    if (ranks or 1) > 1:
+        found["mem_mb_per_cpu"] = growing(-(-of_rank // found["cpus_per_task"]))
+    return found
 
 
 wildcard_constraints:
