@@ -30,8 +30,8 @@ class Training:
 
     @property
     def shards(self) -> list[str]:
-        """Names of all shards, without folder and ending."""
-        return self.first_shards(self.dataset["shards"])
+        """Names of all shards, without folder and ending; none if samples are not stored."""
+        return self.first_shards(self.dataset["shards"]) if self.dataset["store"] else []
 
     def first_shards(self, count: int) -> list[str]:
         """Names of the first shards of each distribution."""
@@ -55,9 +55,30 @@ class Training:
         return options(how)
 
     @property
+    def data_arguments(self) -> list[str]:
+        """Arguments of `forests grow` and `forests train` beside the shards, if there are any.
+
+        Another job of the run has checked these.
+        """
+        if self.dataset["store"]:
+            return ["--checked"]
+        ranges = self.dataset["ranges"]
+        distributions = [
+            ":".join(map(str, (name, *ranges.get(name, ())))) for name in self.distributions
+        ]
+        samples = {"samples": self.dataset["samples"], "data_seed": self.dataset["seed"]}
+        fits = {"objective": self.dataset["objective"], "poisson": self.poisson}
+        return options(samples | fits | {"distributions": distributions})
+
+    @property
     def train_arguments(self) -> list[str]:
-        """Arguments of `forests grow` and `forests train` that say how."""
-        return options({name: self.forests[name] for name in TRAINING})
+        """Arguments of `forests grow` and `forests train` that say from what, and how."""
+        return self.data_arguments + options({name: self.forests[name] for name in TRAINING})
+
+    def cores(self, usual: int) -> int:
+        """Cores of a job that grows a tree or fits leaves; `usual`: those of a single process."""
+        ranks, threads = self.forests["ranks"], self.forests["threads"]
+        return int(ranks * threads if threads else max(ranks, usual if ranks == 1 else 1))
 
     @property
     def trees(self) -> range:

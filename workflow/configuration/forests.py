@@ -79,6 +79,11 @@ class DatasetSection:
         "fit objective of dataset_gen; sampled-energy is energy by the paper's 5,000 sampled "
         "forces a block, some hundred times slower",
     )
+    store: bool = option(
+        True,
+        "whether samples are written to shards; false draws and fits them where they are used, once "
+        "for each tree and once for the leaves, which saves the disk and costs time",
+    )
     workers: WorkersAnywhere = option(
         1,
         "processes that share the work on one shard, no more than the cores that Snakemake may use"
@@ -138,7 +143,13 @@ class TrainingSection:
     seed: Seed = option(0, "seed of the trees")
     ranks: Ranks = option(
         1,
-        "MPI ranks that fit the leaves; one rank works with as many processes as it has cores [1]",
+        "MPI ranks that share the rows of a tree, and the samples that leaves are fitted to; memory "
+        "for growing falls with them [1]",
+    )
+    threads: WorkersAnywhere | None = option(
+        None,
+        "threads of each of these ranks; null for one in several ranks and for a tree, and for the "
+        "cores of the solver for leaves on one rank [1]",
     )
 
 
@@ -169,7 +180,7 @@ class DefaultDatasetSection(DatasetSection):
 
 @parameters
 class DefaultTrainingSection(TrainingSection):
-    """How the default forests are trained, each tree in a job of its own."""
+    """How the default forests are trained."""
 
     max_leaves: Leaves = option(45_000)
     min_leaf: LeafRows = option(15)

@@ -23,9 +23,13 @@ class JobLimits:
 LIMITS = {
     "generate_shard": JobLimits("a shard of training data, by its number of workers", None, 120),
     "generate_default_shard": JobLimits("the same for the forests of the package", None, 240),
-    "grow_tree": JobLimits("a tree of the forests of the package, by its rows", None, 240),
-    "train_default_forest": JobLimits("the forests of the package, by rows and leaves", None, 240),
-    "train_forests": JobLimits("the run's own forests, by rows and leaves", None, 240),
+    "describe_shard": JobLimits("summary of a shard, for which all of it is checked", 1000, 60),
+    "grow_tree": JobLimits("a tree of the run's own forests, by its rows", None, 240),
+    "grow_default_tree": JobLimits("a tree of the forests of the package, by its rows", None, 240),
+    "train_forests": JobLimits("leaves of the run's own forests, by their number", None, 240),
+    "train_default_forest": JobLimits(
+        "leaves of the forests of the package, by their number", None, 240
+    ),
     "find_modes": JobLimits("modes of a model by a variant", 8000, 120),
     "compare_with_truth": JobLimits("all variants of a model beside the truth", 4000, 30),
     "audit_spectra": JobLimits("audit of a model's spectra", 6000, 30),

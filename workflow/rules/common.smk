@@ -60,16 +60,22 @@ def study_command(how):
     return solver_command(f"study {how}", "carillon")
 
 
-def train_command(plan, how):
-    """Shell command that trains forests: on one rank with several processes, else with one each."""
-    workers = " --workers {threads}" if plan.forests["ranks"] == 1 else ""
+def trees_command(plan, command, how):
+    """Shell command that grows trees or fits leaves, on ranks that share the threads of the rule."""
+    workers = "$(( {threads} > {resources.tasks:q} ? {threads} / {resources.tasks:q} : 1 ))"
+    workers = "{resources.cpus_per_task:q}" if workflow.remote_exec else workers
     python = python_on(plan.forests["ranks"])
-    return f"{python} -m forests train {how}{workers} --out {{output:q}} > {{log:q}} 2>&1"
+    return f"{python} -m forests {command} {how} --workers {workers} --out {{output:q}} > {{log:q}} 2>&1"
 
 
 def block_arguments(part):
     """Blocks that forests are rated on, from a part of the configuration."""
     return options({key: part[key] for key in ("blocks", "materials")})
+
+
+def checked(shards):
+    """Summaries of shards, whose making reads and checks every byte of them, once in a run."""
+    return [f"{shard.removesuffix('.h5')}.json" for shard in shards]
 
 
 def shard_memory(plan):
@@ -78,14 +84,17 @@ def shard_memory(plan):
 
 
 def tree_memory(plan):
-    """Megabytes for growing trees: 128 bytes a row were measured, a third more is asked."""
-    return 2000 + plan.forests["structure_rows"] // 6000
+    """Megabytes of a rank that grows a tree: 44 bytes for each of its rows, which are four fifths of
+    all at most, a third more on several ranks, and 1 kB a leaf."""
+    ranks = plan.forests["ranks"]
+    rows = 0.8 * plan.forests["structure_rows"] * (1.0 if ranks == 1 else 1.33 / ranks)
+    return 1000 + int(44e-6 * rows + 1e-3 * plan.forests["max_leaves"])
 
 
-def training_memory(plan):
-    """Megabytes of a rank for growing trees, and for 0.4 kB a leaf, 3.8 kB in the tree at work."""
-    leaves = plan.forests["max_leaves"] * (2 * plan.forests["trees"] * 0.4 + 3.8) / 1000
-    return tree_memory(plan) + int(leaves)
+def leaves_memory(plan):
+    """Megabytes of a rank that fits leaves: 0.75 kB for each of all trees, 3.8 kB in the one at work."""
+    leaves = plan.forests["max_leaves"] * (2 * plan.forests["trees"] * 0.75 + 3.8) / 1000
+    return 1500 + int(leaves)
 
 
 def growing(first):

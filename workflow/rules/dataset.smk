@@ -22,6 +22,7 @@ rule generate_shard:
         " --out {output:q} > {log:q} 2>&1"
 
 
+# It reads all of a shard and compares every checksum, so that the jobs that train need not.
 rule describe_shard:
     input:
         f"{RESULTS}/dataset/{{distribution}}-{{shard}}.h5",
@@ -31,7 +32,8 @@ rule describe_shard:
         f"{LOGS}/dataset/describe-{{distribution}}-{{shard}}.log",
     benchmark:
         f"{BENCHMARKS}/dataset/describe-{{distribution}}-{{shard}}.tsv"
-    localrule: True
+    resources:
+        **limits("describe_shard"),
     params:
         source=source("dataset_gen.commands.inspect"),
     shell:

@@ -5,10 +5,6 @@ DEFAULT_FOLDER = f"{RESULTS}/default_forest"
 DEFAULT_SHARDS = expand(f"{DEFAULT_FOLDER}/dataset/{{name}}.h5", name=DEFAULT.shards)
 
 
-wildcard_constraints:
-    tree=r"\d+",
-
-
 rule default_forest:
     input:
         f"{DEFAULT_FOLDER}/forests.h5",
@@ -32,29 +28,39 @@ use rule generate_shard as generate_default_shard with:
         ),
 
 
-# Splits are chosen from a subset, tree by tree; leaves are fitted to all rows in one job.
-rule grow_tree:
+use rule describe_shard as describe_default_shard with:
     input:
-        DEFAULT_SHARDS,
+        f"{DEFAULT_FOLDER}/dataset/{{distribution}}-{{shard}}.h5",
+    output:
+        f"{DEFAULT_FOLDER}/dataset/{{distribution}}-{{shard}}.json",
+    log:
+        f"{LOGS}/default_forest/dataset/describe-{{distribution}}-{{shard}}.log",
+    benchmark:
+        f"{BENCHMARKS}/default_forest/dataset/describe-{{distribution}}-{{shard}}.tsv"
+
+
+use rule grow_tree as grow_default_tree with:
+    input:
+        shards=DEFAULT_SHARDS,
+        checked=checked(DEFAULT_SHARDS),
     output:
         f"{DEFAULT_FOLDER}/trees/{{tree}}.h5",
     log:
         f"{LOGS}/default_forest/trees/{{tree}}.log",
     benchmark:
         f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
+    threads: DEFAULT.cores(1)
     resources:
-        **limits("grow_tree", tree_memory(DEFAULT)),
+        **limits("grow_default_tree", tree_memory(DEFAULT), DEFAULT.forests["ranks"], DEFAULT.cores(1)),
     params:
         source=source("forests.commands.grow"),
         training=DEFAULT.train_arguments,
-    shell:
-        "python -m forests grow {input:q} {params.training:q} --tree {wildcards.tree:q}"
-        " --out {output:q} > {log:q} 2>&1"
 
 
-rule train_default_forest:
+use rule train_forests as train_default_forest with:
     input:
         shards=DEFAULT_SHARDS,
+        checked=checked(DEFAULT_SHARDS),
         trees=expand(f"{DEFAULT_FOLDER}/trees/{{tree}}.h5", tree=DEFAULT.trees),
     output:
         f"{DEFAULT_FOLDER}/forests.h5",
@@ -62,14 +68,17 @@ rule train_default_forest:
         f"{LOGS}/default_forest/train.log",
     benchmark:
         f"{BENCHMARKS}/default_forest/train.tsv"
-    threads: SOLVER_CORES
+    threads: DEFAULT.cores(SOLVER_CORES)
     resources:
-        **limits("train_default_forest", training_memory(DEFAULT), DEFAULT.forests["ranks"]),
+        **limits(
+            "train_default_forest",
+            leaves_memory(DEFAULT),
+            DEFAULT.forests["ranks"],
+            DEFAULT.cores(SOLVER_CORES),
+        ),
     params:
         source=source("forests.commands.train"),
         training=DEFAULT.train_arguments,
-    shell:
-        train_command(DEFAULT, "{input.shards:q} {params.training:q} --structure {input.trees:q}")
 
 
 use rule describe_forests as describe_default_forest with:

@@ -1,25 +1,56 @@
-# The two regression forests, and how well they do on blocks they have not seen.
+# The two regression forests, and how well they do on blocks they have not seen. Splits are chosen from a
+# subset of the data, each tree in a job of its own; leaves are fitted to all of it in one more.
 OWN_FORESTS = f"{RESULTS}/forests/forests.h5"
 FORESTS = settings.forests_file(config) or OWN_FORESTS
+OWN_SHARDS = expand(f"{RESULTS}/dataset/{{name}}.h5", name=OWN.shards)
+
+
+wildcard_constraints:
+    tree=r"\d+",
+
+
+rule grow_tree:
+    input:
+        shards=OWN_SHARDS,
+        checked=checked(OWN_SHARDS),
+    output:
+        f"{RESULTS}/forests/trees/{{tree}}.h5",
+    log:
+        f"{LOGS}/forests/trees/{{tree}}.log",
+    benchmark:
+        f"{BENCHMARKS}/forests/trees/{{tree}}.tsv"
+    threads: OWN.cores(1)
+    resources:
+        **limits("grow_tree", tree_memory(OWN), OWN.forests["ranks"], OWN.cores(1)),
+    params:
+        source=source("forests.commands.grow"),
+        training=OWN.train_arguments,
+    shell:
+        trees_command(OWN, "grow", "{input.shards:q} {params.training:q} --tree {wildcards.tree:q}")
 
 
 rule train_forests:
     input:
-        expand(f"{RESULTS}/dataset/{{name}}.h5", name=OWN.shards),
+        shards=OWN_SHARDS,
+        checked=checked(OWN_SHARDS),
+        trees=expand(f"{RESULTS}/forests/trees/{{tree}}.h5", tree=OWN.trees),
     output:
         OWN_FORESTS,
     log:
         f"{LOGS}/forests/train.log",
     benchmark:
         f"{BENCHMARKS}/forests/train.tsv"
-    threads: SOLVER_CORES
+    retries: 2
+    threads: OWN.cores(SOLVER_CORES)
     resources:
-        **limits("train_forests", training_memory(OWN), OWN.forests["ranks"]),
+        **limits("train_forests", leaves_memory(OWN), OWN.forests["ranks"], OWN.cores(SOLVER_CORES)),
     params:
         source=source("forests.commands.train"),
         training=OWN.train_arguments,
     shell:
-        train_command(OWN, "{input:q} {params.training:q}")
+        trees_command(
+            OWN, "train", "{input.shards:q} {params.training:q} --structure {input.trees:q}"
+        )
 
 
 rule describe_forests:
