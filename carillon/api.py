@@ -753,10 +753,12 @@ def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -
 def train(
     shards: Sequence[str | Path], out: str | Path, workers: int = 1, **options: Any
 ) -> Forests:
-    """Train forests on shards of `generate` and write them to a file.
+    """Train forests on shards of `generate`, or on samples that are never stored.
 
+    They are written to a file. A call that was killed goes on from what it kept beside that file.
     Raises UserError for impossible options, unusable shards or too few samples. `options`: `trees`,
-    `depth` and the other options of `carillon train`, with underscores.
+    `depth`, `samples` (in the place of shards) and the other options of `carillon train`, with
+    underscores.
 
     Examples
     --------
@@ -764,19 +766,19 @@ def train(
     >>> with TemporaryDirectory() as folder:
     ...     ca.generate(f"{folder}/shard.h5", samples=200)
     ...     trained = ca.train([f"{folder}/shard.h5"], f"{folder}/forests.h5", trees=1, min_leaf=10)
-    >>> trained.model.forests.trees
-    1
+    ...     same = ca.train([], f"{folder}/same.h5", samples=200, trees=1, min_leaf=10)
+    >>> trained.model.forests.trees, same.model.scores == trained.model.scores
+    (1, True)
     """
-    from forests.model import save_model
-    from forests.training.dataset import open_dataset
+    from forests.training.made import SAMPLE_NAMES, SampleOptions, training_data
     from forests.training.options import TrainingOptions
     from forests.training.ranks import Ranks
-    from forests.training.train import model_of, train_trees
+    from forests.training.train import write_forests
 
-    training, dataset = TrainingOptions(**options), open_dataset([str(path) for path in shards])
-    trained = train_trees(dataset, training, Ranks(None), checked("workers", workers, Workers))
-    assert trained is not None
-    save_model(out, model_of(dataset, training, trained))
+    made = {name: options.pop(name) for name in SAMPLE_NAMES if name in options}
+    training = TrainingOptions(**options)
+    dataset = training_data([str(path) for path in shards], SampleOptions(**made), training.seed)
+    write_forests(out, dataset, training, Ranks(), checked("workers", workers, Workers))
     return Forests.load(out)
 
 

@@ -156,6 +156,23 @@ def test_trees_keep_their_limits(name, kinks):
         assert tree.depth <= limits.depth
 
 
+def test_a_tree_of_fewer_leaves_is_the_beginning_of_a_larger_one(kinks):
+    """Splits are made where they gain most: none is lost when more leaves are allowed."""
+    small, large = (GROWERS["linear"](kinks, TreeLimits(leaves, 30, 20), 7) for leaves in (40, 150))
+    assert small.leaves == 40 and large.leaves == 150
+    node, same = [(0, 0), (1, 1), (2, 2)], 0
+    while node:
+        mine, theirs = node.pop()
+        if small.left[mine] < 0:
+            continue
+        assert small.feature[mine] == large.feature[theirs]
+        assert small.threshold[mine] == large.threshold[theirs]
+        same += 1
+        node.append((small.left[mine], large.left[theirs]))
+        node.append((small.right[mine], large.right[theirs]))
+    assert same == small.leaves - 3
+
+
 def test_every_void_pattern_has_its_own_root_or_its_neighbours(kinks):
     tree = GROWERS["linear"](kinks, TreeLimits(50, 30, 20), 0)
     np.testing.assert_array_equal(tree.roots[:3], [0, 1, 2])

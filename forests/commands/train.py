@@ -12,12 +12,10 @@ from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import Positive
 from carillon.processes.ranks import world
 from forests.commands.training import add_training, add_workers, data_of
-from forests.model import save_model
 from forests.training.dataset import Dataset
-from forests.training.kept import Kept
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
-from forests.training.train import Grown, model_of, parameters_of, train_trees
+from forests.training.train import Grown, parameters_of, write_forests
 from forests.training.tree_file import load_trees
 
 EXAMPLES = """examples:
@@ -58,23 +56,18 @@ def run(arguments: argparse.Namespace) -> None:
     """Train and write the model, together with the other ranks of the job if there are any."""
     ranks = Ranks(world())
     training, dataset, grown = ranks.agree(lambda: _opened(arguments, ranks))
-    with ranks.held(arguments.out):
-        kept = Kept(arguments.out, parameters_of(dataset, training))
-        trained = train_trees(
-            dataset,
-            training,
-            ranks,
-            arguments.workers,
-            grown=grown,
-            kept=kept,
-            keep_seconds=60.0 * arguments.keep_minutes,
-        )
-        if trained is None:
-            return
-        model = model_of(dataset, training, trained)
-        save_model(arguments.out, model)
-        kept.remove()
-    facts = trained.facts
+    model = write_forests(
+        arguments.out,
+        dataset,
+        training,
+        ranks,
+        arguments.workers,
+        grown=grown,
+        keep_seconds=60.0 * arguments.keep_minutes,
+    )
+    if model is None:
+        return
+    facts = model.provenance
     scores = "".join(f", {name} {value:.4g}" for name, value in model.scores.items())
     say(
         f"{arguments.out}: {facts['training_rows']:,} rows; structure "

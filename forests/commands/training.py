@@ -2,11 +2,10 @@
 
 import argparse
 
-from carillon.errors import UserError
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.quantities import Workers
-from forests.training.dataset import Dataset, made_dataset, open_dataset
-from forests.training.made import SampleOptions
+from forests.training.dataset import Dataset
+from forests.training.made import SampleOptions, training_data
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
 
@@ -33,12 +32,6 @@ def data_of(arguments: argparse.Namespace, ranks: Ranks) -> Dataset:
 
     Raises UserError if there are none, or they cannot be used.
     """
-    if arguments.datasets and arguments.samples is not None:
-        raise UserError(
-            f"found {len(arguments.datasets)} shards and --samples {arguments.samples}, expected "
-            "one of both"
-        )
-    if arguments.datasets:
-        own = slice(0, 0) if arguments.checked else slice(ranks.rank, None, ranks.size)
-        return open_dataset(arguments.datasets, own)
-    return made_dataset(collect(SampleOptions, arguments).parts(arguments.seed))
+    own = slice(0, 0) if arguments.checked else slice(ranks.rank, None, ranks.size)
+    made = collect(SampleOptions, arguments)
+    return training_data(arguments.datasets, made, arguments.seed, own)

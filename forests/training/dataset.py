@@ -108,9 +108,11 @@ class Dataset:
             for block in np.split(chosen, range(BLOCK_CUBES, number, BLOCK_CUBES))
         ]
 
-    def blocks(self) -> range:
-        """First positions of all blocks of `BLOCK` samples; the last one may have fewer."""
-        return range(0, self.count, BLOCK)
+    def blocks(self, first: int = 0) -> list[Run]:
+        """Blocks of `BLOCK` samples from a position on; the last one may have fewer."""
+        return [
+            (begin, min(begin + BLOCK, self.count)) for begin in range(first, self.count, BLOCK)
+        ]
 
     def subset(self, samples: int) -> Samples:
         """About so many of the samples that are trained on, evenly spread."""

@@ -15,7 +15,7 @@ import numpy as np
 from carillon.command_line.progress import track
 from forests.scaling import is_logarithmic
 from forests.training.blocks import WINDOW, in_order
-from forests.training.dataset import BLOCK, STUDIED, Dataset, Samples, joined, rows_of
+from forests.training.dataset import STUDIED, Dataset, Run, Samples, joined, rows_of
 from forests.training.exact_sums import Sums, bits_of
 from forests.training.leaves import leaf_of, packed
 from forests.training.options import TrainingOptions
@@ -81,7 +81,7 @@ def add_samples(
     begin, before = time.monotonic(), state.seconds
     done = ranks.from_one(state.samples)
     adding = _Adding(state, dataset, training, trees)
-    blocks = [start for start in dataset.blocks() if start >= done]
+    blocks = dataset.blocks(done)
     length = SLICE_BLOCKS * ranks.size
     kept, cost = begin, 0.0
 
@@ -95,8 +95,7 @@ def add_samples(
                     held_out.append(block)
                     yield samples * ranks.size
                 state.held_out = joined(held_out)
-                last = blocks[min(first + length, len(blocks)) - 1]
-                state.samples = min(last + BLOCK, dataset.count)
+                state.samples = blocks[first : first + length][-1][1]
                 due = time.monotonic() - kept > max(keep_seconds, COSTLY * cost)
                 if keep is None or not ranks.from_one(due):
                     continue
@@ -131,16 +130,15 @@ class _Adding:
         self._locks = {job: Lock() for job in trees}
         self._counting = Lock()
 
-    def block(self, begin: int) -> tuple[Samples, int]:
-        """Add the block from a position on: what of it is not trained on, and its length."""
-        end = min(begin + BLOCK, self._dataset.count)
-        samples = joined(self._dataset.read([(begin, end)]))
+    def block(self, run: Run) -> tuple[Samples, int]:
+        """Add the samples of a block: what of it is not trained on, and its length."""
+        samples = joined(self._dataset.read([run]))
         out = self._dataset.is_held_out(samples.position)
         learned = samples.where(~out)
         rows = rows_of(learned, self._training.transform, self._training.uniform_weight)
         # Threads begin with different trees, so that none waits for the others' sums.
         jobs = list(self._trees)
-        turn = begin // BLOCK % max(1, len(jobs))
+        turn = run[0] // (run[1] - run[0]) % len(jobs)
         for job in jobs[turn:] + jobs[:turn]:
             own = rows[self._training.kind(job)]
             leaf_numbers = leaf_of(self._trees[job], own.features, own.pattern)
@@ -149,7 +147,7 @@ class _Adding:
                 sums.add(leaf_numbers, own.features, own.target, own.weight)
         with self._counting:
             self._state.used += len(learned.young)
-        return samples.where(out), end - begin
+        return samples.where(out), run[1] - run[0]
 
 
 def _gather(state: LeafSums, ranks: Ranks) -> None:

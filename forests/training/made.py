@@ -1,5 +1,7 @@
 """Samples that a training draws and fits itself: how many, of which moduli, fitted how."""
 
+from collections.abc import Sequence
+from dataclasses import fields
 from typing import Annotated, Any
 
 from carillon.errors import UserError
@@ -9,6 +11,7 @@ from carillon.parameters.quantities import Count, Number, PoissonRatio
 from dataset_gen.objectives import DATASET_OBJECTIVES, DEFAULT_OBJECTIVE
 from dataset_gen.sampling import DISTRIBUTIONS
 from dataset_gen.settings import Settings, ShardOptions, settings_of
+from forests.training.dataset import Dataset, made_dataset, open_dataset
 
 
 def whole_number(text: str) -> int:
@@ -79,6 +82,25 @@ class SampleOptions:
             )
             for number, words in enumerate(self.distributions)
         ]
+
+
+SAMPLE_NAMES = tuple(field.name for field in fields(SampleOptions))
+"""Names of what can be said of samples."""
+
+
+def training_data(
+    shards: Sequence[str], made: SampleOptions, seed: int, own: slice = slice(None)
+) -> Dataset:
+    """The shards as one dataset, or else samples that are made where they are used.
+
+    `seed`: of the splits; `own`: shards that are checked whole, see `open_dataset`. Raises
+    UserError if there are both or none, or they cannot be used.
+    """
+    if shards and made.samples is not None:
+        raise UserError(
+            f"found {len(shards)} shards and {made.samples:,} samples to make, expected one of both"
+        )
+    return open_dataset(shards, own) if shards else made_dataset(made.parts(seed))
 
 
 def _range_of(words: str) -> dict[str, Any]:

@@ -3,10 +3,11 @@
 import time
 from dataclasses import asdict, replace
 from itertools import groupby
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from carillon.records import provenance
-from forests.model import Model
+from forests.model import Model, save_model
 from forests.training.dataset import Dataset, Samples
 from forests.training.growing import KINDS, grow_trees
 from forests.training.kept import Kept
@@ -122,6 +123,35 @@ def model_of(dataset: Dataset, training: TrainingOptions, trained: Trained) -> M
         "depth": float(max(tree.depth for tree in trained.trees.values())),
     }
     return replace(model, scores=scores)
+
+
+def write_forests(
+    out: str | Path,
+    dataset: Dataset,
+    training: TrainingOptions,
+    ranks: Ranks,
+    workers: int = 1,
+    progress: bool = True,
+    grown: Grown | None = None,
+    keep_seconds: float = SAVE_SECONDS,
+) -> Model | None:
+    """Train a model and write it; what is known is kept beside the file until it is there.
+
+    Returns the model on the first rank, None on the others. Raises UserError if another process
+    trains the same file, or what is there of an earlier training has other parameters. For the rest
+    see `train_trees`.
+    """
+    with ranks.held(out):
+        kept = Kept(out, parameters_of(dataset, training))
+        trained = train_trees(
+            dataset, training, ranks, workers, progress, grown, kept, keep_seconds
+        )
+        if trained is None:
+            return None
+        model = model_of(dataset, training, trained)
+        save_model(out, model)
+        kept.remove()
+    return model
 
 
 def parameters_of(dataset: Dataset, training: TrainingOptions) -> dict[str, Any]:

@@ -81,8 +81,8 @@ class DatasetSection:
     )
     store: bool = option(
         True,
-        "whether samples are written to shards; false draws and fits them where they are used, once "
-        "for each tree and once for the leaves, which saves the disk and costs time",
+        "whether samples are written to shards; false draws and fits them where they are used, "
+        "for each tree and for the leaves, which saves the disk and costs time",
     )
     workers: WorkersAnywhere = option(
         1,
@@ -143,8 +143,8 @@ class TrainingSection:
     seed: Seed = option(0, "seed of the trees")
     ranks: Ranks = option(
         1,
-        "MPI ranks that share the rows of a tree, and the samples that leaves are fitted to; memory "
-        "for growing falls with them [1]",
+        "MPI ranks that share the rows of a tree, and the samples that leaves are fitted to; the "
+        "memory of each for growing falls with them [1]",
     )
     threads: WorkersAnywhere | None = option(
         None,
