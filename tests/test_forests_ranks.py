@@ -45,6 +45,25 @@ def test_forests_do_not_depend_on_the_number_of_ranks(ranks, folder, reference, 
     assert found.provenance["ranks"] == ranks
 
 
+FEW_IN_TOP = """
+import sys
+from forests.__main__ import main
+from forests.training import growing
+
+growing.TOP_SAMPLES = 8000
+sys.exit(main())
+"""
+
+
+def test_rows_find_their_subtrees_where_the_top_has_a_sample_alone(folder, tmp_path, mpiexec):
+    program = tmp_path / "program.py"
+    program.write_text(FEW_IN_TOP)
+    data = ("--samples", 60_000, "--seed", 2, *OPTIONS, "--tree", 3)
+    for ranks in (1, 3):
+        mpiexec(ranks, program, "grow", *data, "--out", tmp_path / f"{ranks}.h5", check=True)
+    assert digest(tmp_path / "1.h5") == digest(tmp_path / "3.h5")
+
+
 def test_trees_grown_by_jobs_of_their_own_make_the_same_forests(folder, reference, run_cli):
     shards = (folder / "0.h5", folder / "1.h5")
     trees = [folder / f"tree-{job}.h5" for job in range(4)]

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from forests.scaling import FEATURES
 from forests.training.moments import ENTRIES, fit_errors, products
 
@@ -24,6 +24,8 @@ QUANTILE_ROWS = 512
 """Rows that the quantiles are taken from."""
 SPLIT_ROWS = 3000
 """Rows at most that a split is chosen from, one at random from each of as many equal parts."""
+ROWS_AT_HAND = 32
+"""Rows whose moments are worked out together."""
 TARGET, WEIGHT = FEATURES, FEATURES + 1
 RECORD = FEATURES + 2
 """Numbers of a row: seven features, target, weight; float32."""
@@ -93,6 +95,37 @@ def _thresholds(rows: NDArray[np.float32], key: np.uint64, edges: Array, values:
 
 
 @numba.njit(cache=True, nogil=True)
+def _add_to_bins(
+    rows: NDArray[np.float32], centre: Array, edges: Array, sums: Array, count: Index
+) -> None:
+    """Write the moments (7, BINS, 45) and the rows (7, BINS) of each feature's bins.
+
+    Some rows at a time, feature by feature, so that all that is added to stays close at hand.
+    """
+    sums[:] = 0.0
+    values, moments = np.empty(FEATURES + 2), np.empty((ROWS_AT_HAND, ENTRIES))
+    column, bins = np.empty(ROWS_AT_HAND), np.empty(ROWS_AT_HAND, dtype=np.int64)
+    for first in range(0, len(rows), ROWS_AT_HAND):
+        here = min(ROWS_AT_HAND, len(rows) - first)
+        for q in range(here):
+            row = rows[first + q]
+            products(row, float(row[TARGET]), float(row[WEIGHT]), centre, values, moments[q])
+        for k in range(FEATURES):
+            for q in range(here):
+                column[q] = rows[first + q, k]
+                bins[q] = 0
+            for b in range(BINS - 1):
+                edge = edges[k, b]
+                for q in range(here):
+                    bins[q] += column[q] > edge
+            for q in range(here):
+                to = sums[k, bins[q]]
+                for entry in range(ENTRIES):
+                    to[entry] += moments[q, entry]
+                count[k, bins[q]] += 1
+
+
+@numba.njit(cache=True, nogil=True)
 def _best_split(
     records: NDArray[np.float32],
     key: np.uint64,
@@ -115,18 +148,8 @@ def _best_split(
     centre /= used
     edges = np.empty((FEATURES, BINS - 1))
     _thresholds(rows, key, edges, np.empty(QUANTILE_ROWS))
-    sums[:] = 0.0
     count = np.zeros((FEATURES, BINS), dtype=np.int64)
-    values, one = np.empty(FEATURES + 2), np.empty(ENTRIES)
-    for q in range(used):
-        products(rows[q], float(rows[q, TARGET]), float(rows[q, WEIGHT]), centre, values, one)
-        for k in range(FEATURES):
-            chosen = 0
-            for b in range(BINS - 1):
-                chosen += rows[q, k] > edges[k, b]
-            for entry in range(ENTRIES):
-                sums[k, chosen, entry] += one[entry]
-            count[k, chosen] += 1
+    _add_to_bins(rows, centre, edges, sums, count)
     # Of the node, and of both sides of every split in turn.
     sides[0] = sums[0].sum(axis=0)
     splits, found = np.empty((FEATURES * (BINS - 1), 2), dtype=np.int64), 0

@@ -15,6 +15,8 @@ ENTRIES = (FEATURES + 2) * (FEATURES + 3) // 2
 
 WEIGHT = ONE * (ONE + 1) // 2 + ONE
 """Entry that holds the sum of the weights."""
+SIDE_BY_SIDE = 32
+"""Fits whose errors are worked out together."""
 RELATIVE_RIDGE = 1e-7
 """Ridge in units of a feature's own spread: enough where features are proportional."""
 ROUNDING = 1e-10
@@ -42,48 +44,75 @@ def products(
 def fit_errors(parts: Array) -> Array:
     """Weighted sums of squared residuals (n,) of linear fits from their sums (n, 45).
 
-    The part of `sum w t^2` that a Cholesky factorisation of the features' scatter leaves. A loop
-    over many, and not a function of one: its unrolled body is long to compile at every call.
+    The part of `sum w t^2` that a Cholesky factorisation of the features' scatter leaves. Fits are
+    taken `SIDE_BY_SIDE`, each step for all of them, which a processor does several at a time.
     """
     errors = np.zeros(len(parts))
-    square, right = np.empty((FEATURES, FEATURES)), np.empty(FEATURES)
-    for part in range(len(parts)):
-        sums = parts[part]
-        total = sums[WEIGHT]
-        if total <= 0.0:
-            continue
-        target = TARGET * (TARGET + 1) // 2
-        ones = ONE * (ONE + 1) // 2
-        mean = sums[target + ONE] / total
-        error = sums[target + TARGET] - mean * sums[target + ONE]
-        for i in range(FEATURES):
-            for j in range(i + 1):
-                outer = sums[ones + i] * sums[ones + j] / total
-                square[i, j] = sums[i * (i + 1) // 2 + j] - outer
-            right[i] = sums[target + i] - sums[ones + i] * mean
-            centre = sums[ones + i] / total
-            constant = ROUNDING * total * (1e-2 + centre * centre)
-            square[i, i] += RELATIVE_RIDGE * square[i, i] + constant
-        for i in range(FEATURES):
-            for j in range(i):
-                value = square[i, j]
-                for k in range(j):
-                    value -= square[i, k] * square[j, k]
-                square[i, j] = value / square[j, j]
-            pivot = square[i, i]
-            for k in range(i):
-                pivot -= square[i, k] * square[i, k]
-                right[i] -= square[i, k] * right[k]
-            if pivot <= 0.0:
-                # Scatter of rounding errors only: the feature explains nothing.
-                square[i, i] = np.inf
-                right[i] = 0.0
-                continue
-            square[i, i] = np.sqrt(pivot)
-            right[i] /= square[i, i]
-            error -= right[i] * right[i]
-        errors[part] = max(error, 0.0)
+    sums = np.empty((ENTRIES, SIDE_BY_SIDE))
+    square = np.empty((FEATURES, FEATURES, SIDE_BY_SIDE))
+    right = np.empty((FEATURES, SIDE_BY_SIDE))
+    inverse, mean, error = np.empty(SIDE_BY_SIDE), np.empty(SIDE_BY_SIDE), np.empty(SIDE_BY_SIDE)
+    for first in range(0, len(parts), SIDE_BY_SIDE):
+        here = min(SIDE_BY_SIDE, len(parts) - first)
+        for p in range(SIDE_BY_SIDE):
+            part = parts[first + min(p, here - 1)]
+            for entry in range(ENTRIES):
+                sums[entry, p] = part[entry]
+        _scatter(sums, inverse, mean, error, square, right)
+        _reduce(square, right, error)
+        for p in range(here):
+            errors[first + p] = max(error[p], 0.0) if inverse[p] > 0.0 else 0.0
     return errors
+
+
+@numba.njit(cache=True, nogil=True)
+def _scatter(
+    sums: Array, inverse: Array, mean: Array, error: Array, square: Array, right: Array
+) -> None:
+    """Write the scatter of the features, and of them with the target, about their means."""
+    target, ones = TARGET * (TARGET + 1) // 2, ONE * (ONE + 1) // 2
+    lanes = range(SIDE_BY_SIDE)
+    for p in lanes:
+        inverse[p] = 1.0 / sums[WEIGHT, p] if sums[WEIGHT, p] > 0.0 else 0.0
+        mean[p] = sums[target + ONE, p] * inverse[p]
+        error[p] = sums[target + TARGET, p] - mean[p] * sums[target + ONE, p]
+    for i in range(FEATURES):
+        for j in range(i + 1):
+            row = i * (i + 1) // 2 + j
+            for p in lanes:
+                outer = sums[ones + i, p] * sums[ones + j, p] * inverse[p]
+                square[i, j, p] = sums[row, p] - outer
+        for p in lanes:
+            right[i, p] = sums[target + i, p] - sums[ones + i, p] * mean[p]
+            centre = sums[ones + i, p] * inverse[p]
+            constant = ROUNDING * sums[WEIGHT, p] * (1e-2 + centre * centre)
+            square[i, i, p] += RELATIVE_RIDGE * square[i, i, p] + constant
+
+
+@numba.njit(cache=True, nogil=True)
+def _reduce(square: Array, right: Array, error: Array) -> None:
+    """Take from the errors what the features explain.
+
+    A feature whose scatter is of rounding errors only explains nothing.
+    """
+    lanes = range(SIDE_BY_SIDE)
+    for i in range(FEATURES):
+        for j in range(i):
+            for k in range(j):
+                for p in lanes:
+                    square[i, j, p] -= square[i, k, p] * square[j, k, p]
+            for p in lanes:
+                square[i, j, p] *= square[j, j, p]
+        for k in range(i):
+            for p in lanes:
+                square[i, i, p] -= square[i, k, p] * square[i, k, p]
+                right[i, p] -= square[i, k, p] * right[k, p]
+        for p in lanes:
+            pivot = square[i, i, p]
+            # The diagonal holds the inverse of the factor's.
+            square[i, i, p] = 1.0 / np.sqrt(pivot) if pivot > 0.0 else 0.0
+            right[i, p] *= square[i, i, p]
+            error[p] -= right[i, p] * right[i, p]
 
 
 def solve(sums: Array) -> Array:
