@@ -8,6 +8,7 @@ from carillon.errors import UserError
 from carillon.command_line.progress import say
 import studies
 from workflow import disk_space, patient_slurm, pinned_meshes, settings, slurm_cleanup, submission
+from workflow.estimate import used
 
 min_version("9.0")
 
@@ -66,8 +67,13 @@ onstart:
         slurm_cleanup.cancel(Path.cwd())
 
 
+onsuccess:
+    used.tell(workflow, config, RESULTS)
+
+
 onerror:
     disk_space.check_disk(RESULTS)
+    used.tell(workflow, config, RESULTS)
 
 
 rule all:

@@ -2,13 +2,18 @@
 
 A line that says what the file is, then frames: a tag of four letters, the length of the content, a
 CRC-32 of all three, the content. The first frame holds the settings; `ENVI` frames say which
-software and machine the work that follows was done on, `TASK` frames hold the rows of one task. A
-frame that is cut off or whose checksum differs ends the journal; what follows it is thrown away.
+software and machine the work that follows was done on, `OWNR` frames which process has the journal
+from there on, `TASK` frames hold the rows of one task. A frame that is cut off or whose checksum
+differs ends the journal; what follows it is thrown away.
+
+Who finds a journal whose owner's end is not certain, as on another machine, goes on with a copy in
+its place; the other owner finds out at its next task and stops.
 """
 
 import json
 import logging
 import os
+import socket
 import struct
 import time
 import zlib
@@ -17,9 +22,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from carillon.errors import UserError
+from carillon.errors import UserError, one_line
 from carillon.files.atomic import sync_folder
-from carillon.files.locks import take
+from carillon.files.locks import is_at, is_exclusive, is_replaced, machine, take, take_over
 from carillon.files.paths import cause
 from dataset_gen.settings import settings_from
 from dataset_gen.tasks import ShardPlan
@@ -30,7 +35,7 @@ SYNC_SECONDS = 1.0
 """Work that is lost with a machine that loses power; a process that is killed loses none of it."""
 _TITLE = b"Carillon journal of a shard, 1\n"
 _FRAME = struct.Struct("<4sQI")
-_PLAN, _ENVIRONMENT, _TASK = b"PLAN", b"ENVI", b"TASK"
+_PLAN, _ENVIRONMENT, _OWNER, _TASK = b"PLAN", b"ENVI", b"OWNR", b"TASK"
 
 
 def journal_of(path: Path) -> Path:
@@ -68,9 +73,11 @@ class Journal:
         self.environments: list[dict[str, Any]] = []
         self._shard = path
         self._synced = time.monotonic()
+        self._owner: dict[str, Any] = {}
         self._file = _locked(self.path)
         try:
-            self._end = self._continued()
+            self._end = self._read()
+            self._own()
             if environment not in self.environments[-1:]:
                 self._append(_ENVIRONMENT, json.dumps(environment).encode())
                 self.environments.append(environment)
@@ -88,8 +95,14 @@ class Journal:
     def append(self, work: bytes) -> None:
         """Add the result of the next task.
 
-        Raises UserError if it cannot be written; all earlier tasks are kept.
+        Raises UserError if it cannot be written, or another process has taken the journal over; all
+        earlier tasks are kept.
         """
+        if is_replaced(self.path, self._file):
+            raise UserError(
+                f"{self._shard}: {_owner_at(self.path)} has taken it over, with the samples that "
+                "were done by then; wait for that one"
+            )
         self._append(_TASK, work)
         self.tasks += 1
         if time.monotonic() - self._synced > SYNC_SECONDS:
@@ -110,21 +123,24 @@ class Journal:
                 yield content
 
     def close(self, remove: bool = False) -> None:
-        """Give up the lock, and the journal if it is to be removed."""
-        if remove:
+        """Give up the lock, and the journal if it is to be removed, unless it is another's now."""
+        if remove and is_at(self.path, self._file):
             self.path.unlink(missing_ok=True)
         os.close(self._file)
 
-    def _continued(self) -> int:
-        """Read what is there; position after the last good frame, where the file is cut off."""
+    def _read(self) -> int:
+        """Read what is there; position after the last good frame, 0 for a new journal."""
         frames = self._frames()
         tag, content, end = next(frames, (b"", b"", 0))
         if tag != _PLAN:
-            return self._begun()
+            self._require_new()
+            return 0
         self._require_same_plan(content)
         for tag, content, position in frames:
             if tag == _ENVIRONMENT:
                 self.environments.append(json.loads(content))
+            elif tag == _OWNER:
+                self._owner = json.loads(content)
             elif tag == _TASK and len(content) == self.plan.size(self.tasks):
                 self.tasks += 1
             else:
@@ -135,22 +151,31 @@ class Journal:
             logger.warning(
                 f"{self.path}: the last {lost:,} bytes are damaged or incomplete, done again"
             )
-            os.ftruncate(self._file, end)
         return end
 
-    def _begun(self) -> int:
-        """Write the beginning of a new journal; an older one may only be cut off within it."""
-        beginning = _TITLE + _framed(_PLAN, json.dumps(self._plan_values()).encode())
+    def _own(self) -> None:
+        """Make the journal this process's alone, cut off after the last good frame, and say so."""
+        if self._owner.get("machine") == machine() and is_exclusive(self._file):
+            os.ftruncate(self._file, self._end)
+        else:
+            self._file = take_over(self.path, self._file, self._end)
+        if self._end == 0:
+            self._write(self._beginning())
+        owner = {"host": socket.gethostname(), "process": os.getpid(), "machine": machine()}
+        self._append(_OWNER, json.dumps(owner).encode())
+
+    def _require_new(self) -> None:
+        """An older journal may only be cut off within its beginning."""
+        beginning = self._beginning()
         existing = os.pread(self._file, len(beginning) + 1, 0)
         if len(existing) > len(beginning) or not _TITLE.startswith(existing[: len(_TITLE)]):
             raise UserError(
                 f"{self.path}: is no journal or damaged at its beginning, so that the work in it "
                 "cannot be used; remove it to begin again"
             )
-        os.ftruncate(self._file, 0)
-        self._end = 0
-        self._write(beginning)
-        return self._end
+
+    def _beginning(self) -> bytes:
+        return _TITLE + _framed(_PLAN, json.dumps(self._plan_values()).encode())
 
     def _plan_values(self) -> dict[str, Any]:
         return {"task_rows": self.plan.task_rows, "settings": self.plan.settings.as_dict()}
@@ -174,21 +199,7 @@ class Journal:
             )
 
     def _frames(self) -> Iterator[tuple[bytes, bytes, int]]:
-        """Tag, content and end of every good frame from the beginning on."""
-        size = os.fstat(self._file).st_size
-        position = len(_TITLE)
-        if os.pread(self._file, position, 0) != _TITLE:
-            return
-        while size - position >= _FRAME.size:
-            tag, length, checksum = _FRAME.unpack(os.pread(self._file, _FRAME.size, position))
-            position += _FRAME.size
-            if length > size - position:
-                return
-            content = _read(self._file, length, position)
-            position += length
-            if checksum != _checksum(tag, content):
-                return
-            yield tag, content, position
+        return _frames(self._file)
 
     def _append(self, tag: bytes, content: bytes) -> None:
         self._write(_framed(tag, content))
@@ -212,6 +223,41 @@ class Journal:
         )
 
 
+def _frames(file: int, *tags: bytes) -> Iterator[tuple[bytes, bytes, int]]:
+    """Tag, content and end of every good frame from the beginning on; only of `tags` if given."""
+    size = os.fstat(file).st_size
+    position = len(_TITLE)
+    if os.pread(file, position, 0) != _TITLE:
+        return
+    while size - position >= _FRAME.size:
+        tag, length, checksum = _FRAME.unpack(os.pread(file, _FRAME.size, position))
+        position += _FRAME.size
+        if length > size - position:
+            return
+        wanted = not tags or tag in tags
+        content = _read(file, length, position) if wanted else b""
+        position += length
+        if wanted:
+            if checksum != _checksum(tag, content):
+                return
+            yield tag, content, position
+
+
+def _owner_at(journal: Path) -> str:
+    """The process that has a journal, as far as that says so; nothing else is waited for."""
+    owner: dict[str, Any] = {}
+    with suppress(OSError, ValueError):
+        file = os.open(journal, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            for _, content, _ in _frames(file, _OWNER):
+                owner = json.loads(content)
+        finally:
+            os.close(file)
+    if {"process", "host"} <= set(owner):
+        return f"process {owner['process']} on {one_line(str(owner['host']))}"
+    return "another process"
+
+
 def _checksum(tag: bytes, content: bytes) -> int:
     return zlib.crc32(content, zlib.crc32(tag + len(content).to_bytes(8, "little")))
 
@@ -233,5 +279,6 @@ def _read(file: int, length: int, position: int) -> bytes:
 def _locked(journal: Path) -> int:
     return take(
         journal,
-        f"{journal}: another process is generating this shard; wait for it, or choose another name",
+        f"{journal}: {_owner_at(journal)} is generating this shard; wait for it, or choose another "
+        "name",
     )

@@ -113,3 +113,6 @@ def test_a_run_ends_well_on_a_slurm_that_does_not(slurm, tmp_path):
     assert (tmp_path / shard).is_file() and jobs(folder) == 1
     told = (tmp_path / patient_slurm.FOLDER / patient_slurm.LOG).read_text()
     assert "Socket timed out" in told and "no longer known" in told
+    # The run tells it, its jobs do not.
+    assert (done.stdout + done.stderr).count("core-hours of this run") == 1
+    assert "core-hours" not in logs

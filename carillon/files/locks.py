@@ -1,19 +1,28 @@
-"""Locks that die with their process: who comes second is told so, instead of doing work twice."""
+"""Locks that die with their process: who comes second is told so, instead of doing work twice.
+
+A network file system may keep locks to one machine, or have none; and a machine that was cut off
+writes late what it had to write. Against both, a file that may have another writer is not gone on
+with: a copy takes its place (`take_over`), and the other writer's late bytes go to the old file.
+"""
 
 import errno
 import fcntl
 import logging
 import os
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from carillon.errors import UserError
+from carillon.files.atomic import sync_folder, temporary_name
 from carillon.files.paths import cause, require_writable
 
 logger = logging.getLogger(__name__)
 
+PIECE = 1 << 24
+"""Bytes that are copied at a time."""
 _NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.EINVAL)
 
 
@@ -54,7 +63,7 @@ def take(name: Path, refusal: str) -> int:
             if not stat.S_ISREG(os.fstat(file).st_mode):
                 raise UserError(f"{name}: is no regular file, remove it")
             _lock(name, file, refusal)
-            if _is_at(name, file):
+            if is_at(name, file):
                 return file
         except BaseException:
             os.close(file)
@@ -73,7 +82,60 @@ def _lock(name: Path, file: int, refusal: str) -> None:
         logger.warning(f"{name}: this file system has no locks; write no result twice at a time")
 
 
-def _is_at(name: Path, file: int) -> bool:
+def is_at(name: Path, file: int) -> bool:
+    """Whether the open file is the one that is called `name`."""
     with suppress(FileNotFoundError):
         return os.path.samestat(os.lstat(name), os.fstat(file))
     return False
+
+
+def is_replaced(name: Path, file: int) -> bool:
+    """Whether another file than the open one is called `name`; an absent one may come back."""
+    try:
+        return not os.path.samestat(os.lstat(name), os.fstat(file))
+    except OSError:
+        return False
+
+
+def is_exclusive(file: int) -> bool:
+    """Whether the lock of a file from `take` keeps out the other processes of this machine."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def machine() -> str:
+    """What the locks of a file that is kept to one machine have in common: this kernel's start."""
+    return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+
+
+def take_over(name: Path, file: int, length: int) -> int:
+    """Put a copy of the first `length` bytes in the place of a file from `take`, which it closes.
+
+    Returns the copy, locked, which no other process has open. Raises UserError if it cannot be
+    made; the file then stays as it was, and open.
+    """
+    start, end = temporary_name(name.name)
+    try:
+        copy, temporary = tempfile.mkstemp(prefix=start, suffix=end, dir=name.parent)
+        try:
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(copy, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.fchmod(copy, stat.S_IMODE(os.fstat(file).st_mode))
+            done = 0
+            while done < length and (piece := os.pread(file, min(PIECE, length - done), done)):
+                done += os.pwrite(copy, piece, done)
+            os.fsync(copy)
+            os.replace(temporary, name)
+        except BaseException:
+            os.close(copy)
+            with suppress(OSError):
+                os.unlink(temporary)
+            raise
+    except OSError as error:
+        raise UserError(f"{name}: cannot be taken over ({cause(error)})") from None
+    sync_folder(name.parent)
+    os.close(file)
+    return copy

@@ -151,12 +151,16 @@ def _finished_jobs(folder: Path) -> pd.DataFrame:
         raise UserError(f"{folder}: holds no benchmark files, expected results of a run")
     files = [[file for file in map(below, names) if file.is_file()] for names in jobs["outputs"]]
     return jobs.assign(
-        seconds=[_seconds(below(name)) for name in jobs["benchmark"]],
+        seconds=[benchmarked_seconds(below(name)) for name in jobs["benchmark"]],
         megabytes=[sum(file.stat().st_size for file in each) / 1e6 for each in files],
     )
 
 
-def _seconds(file: Path) -> float:
+def benchmarked_seconds(file: Path) -> float:
+    """Wall time of a job by its benchmark file [s].
+
+    Raises UserError if it is none.
+    """
     try:
         return float(pd.read_csv(file, sep="\t", nrows=1)["s"].iloc[0])
     except (ValueError, LookupError, OSError):

@@ -108,17 +108,21 @@ def _planned(file: Path, cores: int) -> list[dict[str, Any]]:
         main = [job for job in dag.jobs if job.rule.name == TARGETS[0]]
         needed = set(dag.bfs(dag.dependencies, *main))
         return [
-            {
-                "kind": f"{job.rule.name} {job.wildcards_dict.get('variant', '')}".strip(),
-                "model": job.wildcards_dict.get("model", ""),
-                "target": TARGETS[job not in needed],
-                "cores": job.threads,
-                "memory_mb": requested_memory(job.resources),
-                "minutes": job.resources.get("runtime"),
-                "command": job.shellcmd or "",
-                "outputs": list(map(str, job.output)),
-                "benchmark": str(job.benchmark or ""),
-            }
+            described(job) | {"target": TARGETS[job not in needed]}
             for job in sorted(dag.jobs, key=lambda job: (job.rule.name, list(job.output)))
             if job.output
         ]
+
+
+def described(job: Any) -> dict[str, Any]:
+    """Columns of `plan` but the target, of a job of Snakemake's."""
+    return {
+        "kind": f"{job.rule.name} {job.wildcards_dict.get('variant', '')}".strip(),
+        "model": job.wildcards_dict.get("model", ""),
+        "cores": job.threads,
+        "memory_mb": requested_memory(job.resources),
+        "minutes": job.resources.get("runtime"),
+        "command": job.shellcmd or "",
+        "outputs": list(map(str, job.output)),
+        "benchmark": str(job.benchmark or ""),
+    }

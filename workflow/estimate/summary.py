@@ -91,7 +91,7 @@ def as_text(result: Mapping[str, Any], title: str) -> str:
 
 
 def _line(row: Mapping[str, Any]) -> str:
-    hours = f"{_number(row['core_hours']):>12}{duration(row['wall_hours']):>11}"
+    hours = f"{shown_number(row['core_hours']):>12}{duration(row['wall_hours']):>11}"
     return (
         f"{row['stage']:<25}{row['jobs']:>6,}{hours}{_size(row['memory_gb']):>10}"
         f"{_size(row['kept_gb']):>10}"
@@ -108,17 +108,23 @@ def duration(hours: float) -> str:
     """
     for unit, name in ((24.0, "d"), (1.0, "h"), (1.0 / 60.0, "min")):
         if hours >= 2.0 * unit:
-            return f"{_number(hours / unit)} {name}"
-    return f"{_number(3600.0 * hours)} s"
+            return f"{shown_number(hours / unit)} {name}"
+    return f"{shown_number(3600.0 * hours)} s"
 
 
 def _size(gigabytes: float) -> str:
     for unit, name in ((1e3, "TB"), (1.0, "GB"), (1e-3, "MB")):
         if gigabytes >= unit:
-            return f"{_number(gigabytes / unit)} {name}"
+            return f"{shown_number(gigabytes / unit)} {name}"
     return "<1 MB" if gigabytes else "-"
 
 
-def _number(value: float) -> str:
-    """Two significant digits, or all before the point."""
+def shown_number(value: float) -> str:
+    """Two significant digits, or all before the point.
+
+    Examples
+    --------
+    >>> [shown_number(value) for value in (0.0123, 3.0, 1234.5)]
+    ['0.012', '3', '1,234']
+    """
     return f"{value:,.0f}" if value >= 10.0 else f"{value:.2g}"
