@@ -7,11 +7,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from tests.once import once
+from tests.patience import HANG_SECONDS
 from tests.programs import checkout_environment, run
 from tests.workflow_runs import CHECKOUT
 
@@ -28,11 +33,15 @@ QUICK = (
     "--slurm-keep-successful-logs",
 )
 """Options for jobs of seconds: the profile is for jobs of hours."""
+PATIENT_RANKS = {"OMPI_MCA_mpi_yield_when_idle": "1"}
+"""Ranks let others work while they wait: nodes of one machine have more cores than it has."""
+IMPOSSIBLE = ("has a SLURM already", "several nodes need")
+"""Words of the script where the machine does not allow a cluster."""
 
 
 @dataclass(frozen=True)
 class Cluster:
-    """A running cluster of one node.
+    """A running cluster.
 
     Attributes
     ----------
@@ -41,18 +50,27 @@ class Cluster:
 
     folder: Path
 
-    def fail(self) -> None:
-        """Let the node die, with all of its jobs."""
-        control("fail", self.folder)
+    def fail(self, *node: str) -> None:
+        """Let a node die with all of its jobs; without a name the one that is this machine."""
+        control("fail", self.folder, *node)
 
-    def repair(self) -> None:
+    def repair(self, *node: str) -> None:
         """Bring the node back, and start what it lost soon; SLURM would wait two minutes."""
-        control("repair", self.folder)
-        # Until the node has been told that the jobs are dead, it would kill them again.
-        time.sleep(5)
+        control("repair", self.folder, *node)
+        if not node:
+            # Until the node has been told that the jobs are dead, it would kill them again.
+            time.sleep(5)
+        self.start_waiting_jobs()
+
+    def start_waiting_jobs(self) -> None:
+        """Start jobs now that were put back into the queue."""
         waiting = ["squeue", "--noheader", "--states=PENDING", "--format=%A"]
         for job in run(*waiting).stdout.split():
             subprocess.run(["scontrol", "update", f"JobId={job}", "StartTime=now"], check=True)
+
+    def on(self, node: str, *words: object, **options: Any) -> subprocess.CompletedProcess[str]:
+        """Run a program on a node, in the same folder; options are those of `run`."""
+        return run("bash", SCRIPT, "on", self.folder, node, *words, **options)
 
     def restart_controller(self, pause: float) -> None:
         """Leave the cluster without slurmctld for some seconds."""
@@ -70,36 +88,90 @@ class Cluster:
             subprocess.run(["scontrol", "update", f"JobId={job}", "TimeLimit=1"], check=True)
 
     def log(self) -> str:
-        """What slurmd has to say."""
-        return (self.folder / "log" / "slurmd.log").read_text()
+        """What slurmd has to say, that of all nodes."""
+        logs = sorted((self.folder / "log").glob("slurmd-*.log"))
+        return "".join(log.read_text() for log in logs)
+
+    def ended(self) -> list[dict[str, str]]:
+        """Jobs that ended, in order; SLURM's names of what it records, such as NodeList."""
+        record = self.folder / "log" / "jobs.txt"
+        lines = record.read_text().splitlines() if record.exists() else []
+        return [dict(re.findall(r"(\w+)=(\S*)", line)) for line in lines]
 
     def ends(self) -> list[str]:
         """How jobs ended, one state each, in order."""
-        record = self.folder / "log" / "jobs.txt"
-        return re.findall(r"JobState=(\S+)", record.read_text()) if record.exists() else []
+        return [job["JobState"] for job in self.ended()]
 
 
-def control(*arguments: object) -> None:
-    """Run the cluster's script."""
-    done = run("bash", SCRIPT, *arguments, env={**os.environ, "PATH": PLAIN})
+def control(*arguments: object, **variables: str) -> None:
+    """Run the cluster's script, with more variables in its environment."""
+    done = run("bash", SCRIPT, *arguments, env={**os.environ, "PATH": PLAIN, **variables})
     if done.returncode:
         raise RuntimeError(f"{SCRIPT.name} {arguments[0]}: {done.stderr}")
 
 
-def started(folder: Path) -> Cluster:
-    """Install SLURM where it is missing and start a cluster; skip where that is impossible."""
+@contextmanager
+def running(folder: Path, together: Path, *options: object, **variables: str) -> Iterator[Cluster]:
+    """A cluster until the body ends: a machine has room for one at a time.
+
+    SLURM is installed where it is missing; the test is skipped where a cluster is impossible.
+
+    Parameters
+    ----------
+    folder
+        Of the cluster.
+    together
+        Folder of all processes of this session of tests, which all nodes see.
+    options
+        Of the script's action `start`.
+    variables
+        Of the environment of the script.
+    """
     if os.geteuid() != 0:
         pytest.skip("a SLURM cluster can only be started by root")
     if not shutil.which("slurmctld", path=DAEMONS) and not shutil.which("apt-get"):
         pytest.skip("no SLURM here, and no apt-get to install it by")
-    control("install")
-    try:
-        control("start", folder)
-    except RuntimeError as error:
-        if "has a SLURM already" not in str(error):
-            raise
-        pytest.skip(str(error))
-    return Cluster(folder)
+    with once(together / "slurm-cluster"):
+        control("install")
+        try:
+            # It is stopped as well if this process is killed.
+            control(
+                *("start", folder, "--while", os.getpid(), *options),
+                **{"SHARED": str(together), **variables},
+            )
+        except RuntimeError as error:
+            if not any(words in str(error) for words in IMPOSSIBLE):
+                raise
+            pytest.skip(str(error))
+        try:
+            yield Cluster(folder)
+        finally:
+            control("stop", folder)
+
+
+def batch(
+    folder: Path, *words: object, options: Sequence[object] = ()
+) -> subprocess.CompletedProcess[str]:
+    """Run one of the job scripts, or another command, by `sbatch --wait` in a folder.
+
+    Parameters
+    ----------
+    words
+        The script and its arguments.
+    options
+        Of `sbatch`.
+
+    Returns
+    -------
+    The process; what the jobs have printed stands in the files `slurm-*.out`.
+    """
+    environment = checkout_environment(PYTHON=sys.executable, **PATIENT_RANKS)
+    return run("sbatch", "--wait", *options, *words, cwd=folder, env=environment)
+
+
+def logs(folder: Path) -> str:
+    """What the jobs of `batch` have printed."""
+    return "".join(path.read_text() for path in sorted(folder.glob("slurm-*.out")))
 
 
 def snakemake(folder: Path, *options: object) -> subprocess.Popen[str]:
@@ -109,8 +181,23 @@ def snakemake(folder: Path, *options: object) -> subprocess.Popen[str]:
         return subprocess.Popen(
             [str(part) for part in (*command, "--profile", PROFILE, *QUICK, *options)],
             cwd=folder,
-            env=checkout_environment(),
+            env=checkout_environment(**PATIENT_RANKS),
             stdout=log,
             stderr=subprocess.STDOUT,
             text=True,
         )
+
+
+def finish(process: subprocess.Popen[str], folder: Path) -> str:
+    """Output of a run that has to end well."""
+    log = folder / "snakemake.log"
+    try:
+        process.wait(HANG_SECONDS)
+    except subprocess.TimeoutExpired:
+        jobs = run("squeue", "--long").stdout
+        pytest.fail(f"it hangs:\n{log.read_text()[-6000:]}{jobs}")
+    finally:
+        process.kill()
+    output = log.read_text()
+    assert process.returncode == 0, output[-6000:]
+    return output

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import read_modes
 from tests import slurm_cluster, workflow_runs
-from tests.patience import HANG_SECONDS, wait_for, words_of
+from tests.patience import wait_for, words_of
 from tests.workflow_runs import CHECKOUT
 from workflow import slurm_cleanup
 from workflow.commands.digest import digest
@@ -37,25 +37,10 @@ DATASET = [f"results/dataset/uniform-{shard}.h5" for shard in range(SHARDS)]
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory):
+def cluster(tmp_path_factory, together):
     """A cluster of this machine alone."""
-    found = slurm_cluster.started(tmp_path_factory.mktemp("slurm"))
-    yield found
-    slurm_cluster.control("stop", found.folder)
-
-
-def finish(run: subprocess.Popen[str], folder: Path) -> str:
-    """Output of a run that has to end well."""
-    try:
-        run.wait(HANG_SECONDS)
-    except subprocess.TimeoutExpired:
-        jobs = subprocess.run(["squeue", "--long"], capture_output=True, text=True).stdout
-        pytest.fail(f"it hangs:\n{(folder / 'snakemake.log').read_text()[-6000:]}{jobs}")
-    finally:
-        run.kill()
-    output = (folder / "snakemake.log").read_text()
-    assert run.returncode == 0, output[-6000:]
-    return output
+    with slurm_cluster.running(tmp_path_factory.mktemp("slurm"), together) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +60,7 @@ def remote(cluster, tmp_path_factory):
     folder = tmp_path_factory.mktemp("remote")
     (folder / "config.yaml").write_text(SMALL.replace("LAUNCHER", "null"))
     wanted = (MODES, UNCORRECTED, "--configfile", "config.yaml")
-    finish(slurm_cluster.snakemake(folder, *wanted), folder)
+    slurm_cluster.finish(slurm_cluster.snakemake(folder, *wanted), folder)
     return folder
 
 
@@ -107,17 +92,12 @@ def test_jobs_were_an_array_and_mpi_jobs(remote):
 @pytest.mark.system
 def test_array_by_hand_yields_identical_shards(cluster, remote, tmp_path):
     arguments = f"--samples {SAMPLES} --shards {SHARDS} --seed 0 --distribution uniform"
-    done = subprocess.run(
-        ["sbatch", "--wait", f"--array=0-{SHARDS - 1}", "--ntasks=2", "--mem-per-cpu=500M"]
-        + [str(CHECKOUT / "slurm" / "shards.sbatch"), "uniform-%a.h5", *arguments.split()],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHON": sys.executable, "PYTHONPATH": str(CHECKOUT)},
-        capture_output=True,
-        text=True,
-        timeout=HANG_SECONDS,
+    done = slurm_cluster.batch(
+        tmp_path,
+        *(CHECKOUT / "slurm" / "shards.sbatch", "uniform-%a.h5", *arguments.split()),
+        options=[f"--array=0-{SHARDS - 1}", "--ntasks=2", "--mem-per-cpu=500M"],
     )
-    logs = "".join(path.read_text() for path in tmp_path.glob("slurm-*.out"))
-    assert done.returncode == 0, done.stderr + logs
+    assert done.returncode == 0, done.stderr + slurm_cluster.logs(tmp_path)
     for file in DATASET:
         assert digest(tmp_path / Path(file).name) == digest(remote / file)
 
@@ -140,7 +120,7 @@ def test_jobs_of_a_killed_run_are_cancelled_by_the_next(cluster, tmp_path):
     (left,) = slurm_cleanup.jobs(tmp_path)
     killed.kill()
     killed.wait()
-    output = finish(slurm_cluster.snakemake(tmp_path, *options), tmp_path)
+    output = slurm_cluster.finish(slurm_cluster.snakemake(tmp_path, *options), tmp_path)
     assert f"cancelled 1 jobs of SLURM that a killed run has left ({left})" in output
     assert "CANCELLED" in cluster.ends() and slurm_cleanup.jobs(tmp_path) == []
     queue = subprocess.run(["squeue", "--noheader", "--format=%A"], capture_output=True, text=True)
@@ -213,7 +193,7 @@ def test_a_job_outlives_all_that_befalls_it(cluster, tmp_path):
     except AssertionError as error:
         run.kill()
         raise AssertionError((tmp_path / "snakemake.log").read_text()[-6000:]) from error
-    assert len(re.findall(r"submitted with SLURM jobid", finish(run, tmp_path))) == 3
+    assert len(re.findall(r"submitted with SLURM jobid", slurm_cluster.finish(run, tmp_path))) == 3
     undisturbed = tmp_path / "undisturbed.h5"
     subprocess.run(
         [sys.executable, "-m", "dataset_gen", "generate", "--samples", str(LONG_SAMPLES)]
