@@ -17,7 +17,7 @@ from workflow.configuration.whole import completed
 def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(plan):
     jobs = plan("default_forest")
     assert jobs["generate_default_shard"] == 2 * 8
-    assert jobs["grow_tree"] == 2 * 3
+    assert jobs["grow_default_tree"] == 2 * 3
     assert jobs["train_default_forest"] == jobs["describe_default_forest"] == 1
     assert "generate_shard" not in jobs and "find_modes" not in jobs
     default = plan()

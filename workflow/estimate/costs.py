@@ -19,7 +19,7 @@ from workflow.estimate.jobs import RESULTS, plan
 
 PACKAGED = Path(__file__).with_name("measured.csv")
 """Medians of a run with the preset `laptop` and one with `tiny`, on two cores of an AMD EPYC, and
-for `generate_shard` one shard of 400,000 samples, since the runs' own do little but start."""
+for `generate_shard` one shard of 200,000 samples, since the runs' own do little but start."""
 START = 1.5
 """Time that a job of any kind takes to start [s]."""
 OTHER_SECONDS = 4.0
@@ -41,6 +41,12 @@ FIT_COSTS = {
     "sampled-energy": 600.0,
 }
 """Time of a fit by objective, in units of a fit with the default objective `calibrated`."""
+
+
+FIT_MICROSECONDS, SAMPLE_MICROSECONDS = 15.0, 2.5
+"""Processor time of a fit by the default objective, and of reading and preparing a sample."""
+ROW_MICROSECONDS, LEAF_MICROSECONDS = 0.5, 200.0
+"""Processor time of a row that goes down a tree, and of a leaf that is grown."""
 
 
 class Law(NamedTuple):
@@ -68,7 +74,8 @@ _READ = {"unknowns": 1.0, "modes": 0.6}
 LAWS = {
     "generate_shard": Law("data generation", {"fits": 1.0}, {"samples": 1.0}, True),
     "describe_shard": Law("data generation", {"samples": 0.5}),
-    "train_forests": Law("growing trees", {"rows": 0.9, "trees": 1.0}, {"rows": 0.5}, True),
+    "grow_tree": Law("growing trees", {"growing": 1.0}, {"leaves": 1.0}, True),
+    "train_forests": Law("fitting leaves", {"fitting": 1.0}, {"leaves": 1.0}, True),
     "rate_forests": Law("errors on single blocks", {"blocks": 0.75, "materials": 1.0}),
     "find_modes": Law(_VARIANTS, _SOLVE, {"unknowns": 1.0, "modes": 1.0}),
     "find_modes truth": Law("ground truth", _SOLVE, {"unknowns": 1.0, "modes": 1.0}),
@@ -182,13 +189,24 @@ def _sizes(job: Any, config: Mapping[str, Any]) -> dict[str, float]:
         mesh = settings.located(config, model["mesh"])
         sizes["unknowns"] = unknowns(mesh, model["resolution"])
         sizes["modes"] = float(model["modes"] or config["solver"]["modes"])
-    dataset = config["dataset"]
-    samples = float(dataset["samples"])
-    rows = ORIGINS * samples * len(dataset["distributions"])
-    return sizes | {
-        "samples": samples / dataset["shards"],
-        "fits": samples / dataset["shards"] * FIT_COSTS[dataset["objective"]],
-        "rows": min(rows, float(config["forests"]["structure_rows"])),
+    return sizes | _training_sizes(config)
+
+
+def _training_sizes(config: Mapping[str, Any]) -> dict[str, float]:
+    """Samples and leaves of the run's own forests, and processor time of training them [us]."""
+    dataset, forests = config["dataset"], config["forests"]
+    samples, fit = float(dataset["samples"]), FIT_COSTS[dataset["objective"]]
+    of_shard = samples / len(dataset["distributions"]) / dataset["shards"]
+    rows = min(ORIGINS * samples, float(forests["structure_rows"]))
+    leaves = min(forests["max_leaves"], rows / forests["min_leaf"] / 2.0)
+    made = 0.0 if dataset["store"] else FIT_MICROSECONDS * fit
+    per_sample = SAMPLE_MICROSECONDS + made
+    return {
+        "samples": of_shard,
+        "fits": of_shard * fit,
+        "leaves": leaves,
+        "growing": rows * (ROW_MICROSECONDS + per_sample / ORIGINS) + leaves * LEAF_MICROSECONDS,
+        "fitting": samples * (per_sample + ORIGINS * forests["trees"] * ROW_MICROSECONDS),
     }
 
 
