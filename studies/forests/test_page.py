@@ -14,14 +14,15 @@ from workflow import settings
 from workflow.configuration.whole import completed
 
 
-def test_default_forests_are_trained_tree_by_tree_and_not_in_the_default_run(plan):
+def test_default_forests_are_trained_tree_by_tree_as_those_of_a_run_and_not_in_it(plan):
     jobs = plan("default_forest")
     assert jobs["generate_default_shard"] == 2 * 8
     assert jobs["grow_default_tree"] == 2 * 3
     assert jobs["train_default_forest"] == jobs["describe_default_forest"] == 1
     assert "generate_shard" not in jobs and "find_modes" not in jobs
     default = plan()
-    assert not {"grow_tree", "compare_on_blocks", "rate_objectives"} & set(default)
+    assert default["grow_tree"] == 2 * 3
+    assert not {"grow_default_tree", "compare_on_blocks", "rate_objectives"} & set(default)
 
 
 def test_the_default_forests_are_named_as_seen_from_the_checkout(monkeypatch):

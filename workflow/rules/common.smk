@@ -119,6 +119,16 @@ def limits(rule, memory=None, ranks=None, cores=SOLVER_CORES):
     return found
 
 
+def tree_limits(rule, plan):
+    """Limits of a rule that grows a tree."""
+    return limits(rule, tree_memory(plan), plan.forests["ranks"], plan.cores(1))
+
+
+def leaves_limits(rule, plan):
+    """Limits of a rule that fits leaves."""
+    return limits(rule, leaves_memory(plan), plan.forests["ranks"], plan.cores(SOLVER_CORES))
+
+
 wildcard_constraints:
     model="|".join(MODELS),
     variant="|".join(variants.VARIANTS),

@@ -51,7 +51,7 @@ use rule grow_tree as grow_default_tree with:
         f"{BENCHMARKS}/default_forest/trees/{{tree}}.tsv"
     threads: DEFAULT.cores(1)
     resources:
-        **limits("grow_default_tree", tree_memory(DEFAULT), DEFAULT.forests["ranks"], DEFAULT.cores(1)),
+        **tree_limits("grow_default_tree", DEFAULT),
     params:
         source=source("forests.commands.grow"),
         training=DEFAULT.train_arguments,
@@ -70,12 +70,7 @@ use rule train_forests as train_default_forest with:
         f"{BENCHMARKS}/default_forest/train.tsv"
     threads: DEFAULT.cores(SOLVER_CORES)
     resources:
-        **limits(
-            "train_default_forest",
-            leaves_memory(DEFAULT),
-            DEFAULT.forests["ranks"],
-            DEFAULT.cores(SOLVER_CORES),
-        ),
+        **leaves_limits("train_default_forest", DEFAULT),
     params:
         source=source("forests.commands.train"),
         training=DEFAULT.train_arguments,

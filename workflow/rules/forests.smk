@@ -21,7 +21,7 @@ rule grow_tree:
         f"{BENCHMARKS}/forests/trees/{{tree}}.tsv"
     threads: OWN.cores(1)
     resources:
-        **limits("grow_tree", tree_memory(OWN), OWN.forests["ranks"], OWN.cores(1)),
+        **tree_limits("grow_tree", OWN),
     params:
         source=source("forests.commands.grow"),
         training=OWN.train_arguments,
@@ -43,7 +43,7 @@ rule train_forests:
     retries: 2
     threads: OWN.cores(SOLVER_CORES)
     resources:
-        **limits("train_forests", leaves_memory(OWN), OWN.forests["ranks"], OWN.cores(SOLVER_CORES)),
+        **leaves_limits("train_forests", OWN),
     params:
         source=source("forests.commands.train"),
         training=OWN.train_arguments,
