@@ -17,6 +17,7 @@ from forests.training.leaves import ANCESTOR_ROWS, add_rows, leaf_of, solve_leav
 from forests.training.moments import ENTRIES, fit_errors, solve
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
+from forests.training.spent import Spent
 from forests.training.structure import Rows, TreeLimits, tree_of
 from forests.training.train import parameters_of
 from forests.training.tree_file import load_trees, save_tree
@@ -282,9 +283,9 @@ def test_trees_grown_apart_are_refused_where_they_do_not_fit(shards, tmp_path):
     parameters = parameters_of(data, QUICK)
     paths = [tmp_path / f"{job}.h5" for job in QUICK.jobs]
     for job, path in zip(QUICK.jobs, paths, strict=True):
-        save_tree(path, trees[job], job, parameters, seconds=2.0)
-    found, seconds = load_trees(paths[::-1], parameters)
-    assert seconds == 8.0
+        save_tree(path, trees[job], job, parameters, Spent(2.0, 1.5))
+    found, spent = load_trees(paths[::-1], parameters)
+    assert spent == Spent(8.0, 6.0)
     for job in QUICK.jobs:
         for name, values in vars(trees[job]).items():
             np.testing.assert_array_equal(values, getattr(found[job], name))

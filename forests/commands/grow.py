@@ -5,7 +5,6 @@ machine is grown on several: mpiexec -n RANKS python -m mpi4py -m carillon grow 
 """
 
 import argparse
-import time
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError
@@ -18,6 +17,7 @@ from forests.training.dataset import Dataset
 from forests.training.growing import grow_trees
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
+from forests.training.spent import Clock, peak_memory
 from forests.training.train import parameters_of
 from forests.training.tree_file import save_tree
 
@@ -39,14 +39,18 @@ def run(arguments: argparse.Namespace) -> None:
     """Grow one tree and write it, together with the other ranks of the job if there are any."""
     ranks = Ranks(world())
     training, dataset = ranks.agree(lambda: _opened(arguments, ranks))
-    begin = time.perf_counter()
+    clock = Clock()
     job = arguments.tree
     ((_, tree),) = grow_trees(dataset, training, [job], ranks, arguments.workers)
     if not ranks.first:
         return
-    seconds = time.perf_counter() - begin
-    save_tree(arguments.out, tree, job, parameters_of(dataset, training), seconds)
-    say(f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}, {seconds:.1f} s")
+    spent = clock.read()
+    save_tree(arguments.out, tree, job, parameters_of(dataset, training), spent)
+    say(
+        f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}; "
+        f"{spent.seconds:.1f} s, {spent.processor_seconds:.1f} s of processor time, peak memory "
+        f"{peak_memory() / 1e6:,.0f} MB"
+    )
 
 
 def _opened(arguments: argparse.Namespace, ranks: Ranks) -> tuple[TrainingOptions, Dataset]:

@@ -6,6 +6,7 @@ On several ranks the forests are the same: mpiexec -n RANKS python -m mpi4py -m 
 
 import argparse
 
+from carillon.command_line import exit_status
 from carillon.command_line.progress import say
 from carillon.files.paths import require_writable
 from carillon.parameters.command_line import collect, reader
@@ -52,21 +53,22 @@ def _opened(
     return training, dataset, load_trees(arguments.structure, parameters_of(dataset, training))
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: argparse.Namespace) -> int:
     """Train and write the model, together with the other ranks of the job if there are any."""
     ranks = Ranks(world())
     training, dataset, grown = ranks.agree(lambda: _opened(arguments, ranks))
-    model = write_forests(
-        arguments.out,
-        dataset,
-        training,
-        ranks,
-        arguments.workers,
-        grown=grown,
-        keep_seconds=60.0 * arguments.keep_minutes,
-    )
+    keep_seconds = 60.0 * arguments.keep_minutes
+    try:
+        model = write_forests(
+            *(arguments.out, dataset, training, ranks, arguments.workers),
+            grown=grown,
+            keep_seconds=keep_seconds,
+        )
+    except KeyboardInterrupt:
+        say(f"{arguments.out}: interrupted; the same command goes on from what was kept")
+        return exit_status.EXIT_INTERRUPTED
     if model is None:
-        return
+        return 0
     facts = model.provenance
     scores = "".join(f", {name} {value:.4g}" for name, value in model.scores.items())
     say(
@@ -74,3 +76,4 @@ def run(arguments: argparse.Namespace) -> None:
         f"{facts['structure_seconds']:.1f} s, leaves {facts['leaves_seconds']:.1f} s = "
         f"{facts['rows_per_second']:,.0f} rows/s{scores}"
     )
+    return 0

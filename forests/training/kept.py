@@ -8,6 +8,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from carillon.files.hdf5 import create_h5, open_h5
 from forests.training.dataset import Samples
 from forests.training.exact_sums import Sums
 from forests.training.leaf_fit import LeafSums
+from forests.training.spent import Spent
 from forests.training.structure import Tree
 from forests.training.tree_file import difference, load_tree, save_tree
 
@@ -44,31 +46,30 @@ class Kept:
     def _sums(self) -> Path:
         return self.folder / "sums.h5"
 
-    def trees(self, jobs: range) -> tuple[dict[int, Tree], float]:
-        """Trees that are there, by number, and the seconds that growing them took.
+    def trees(self, jobs: range) -> tuple[dict[int, Tree], Spent]:
+        """Trees that are there, by number, and the time that growing them took.
 
         Raises UserError if they are damaged or were grown with other parameters.
         """
-        trees, seconds = {}, 0.0
+        trees, spent = {}, Spent()
         for job in jobs:
             if self._tree(job).exists():
                 with self._explained():
                     _, trees[job], took = load_tree(self._tree(job), self._parameters)
-                seconds += took
-        return trees, seconds
+                spent += took
+        return trees, spent
 
-    def keep_tree(self, job: int, tree: Tree, seconds: float) -> None:
+    def keep_tree(self, job: int, tree: Tree, spent: Spent) -> None:
         """Write a tree that was grown."""
         self.folder.mkdir(exist_ok=True)
-        save_tree(self._tree(job), tree, job, self._parameters, seconds)
+        save_tree(self._tree(job), tree, job, self._parameters, spent)
 
     def keep_sums(self, state: LeafSums) -> None:
         """Write what is known of the leaves; what was there before is replaced at the end."""
         self.folder.mkdir(exist_ok=True)
         with create_h5(self._sums, KIND, SCHEMA, sealed=True) as file:
             file.attrs["parameters"] = json.dumps(self._parameters, sort_keys=True)
-            for name in ("samples", "used", "seconds"):
-                file.attrs[name] = getattr(state, name)
+            file.attrs.update({"samples": state.samples, "used": state.used} | asdict(state.spent))
             for name, values in state.held_out._asdict().items():
                 file[f"held_out/{name}"] = values
             for job, sums in state.sums.items():
@@ -94,8 +95,9 @@ class Kept:
             }
             for job, sums in nothing.sums.items():
                 _fill(file[str(job)], sums)
-            samples, used, seconds = (file.attrs[n] for n in ("samples", "used", "seconds"))
-        return LeafSums(nothing.sums, Samples(**held_out), int(samples), int(used), float(seconds))
+            samples, used = int(file.attrs["samples"]), int(file.attrs["used"])
+            spent = Spent(**{field.name: float(file.attrs[field.name]) for field in fields(Spent)})
+        return LeafSums(nothing.sums, Samples(**held_out), samples, used, spent)
 
     def remove(self) -> None:
         """Remove all that was kept."""

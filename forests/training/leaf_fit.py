@@ -4,6 +4,7 @@ Blocks are shared among ranks and threads. They may be added in any order, since
 after every slice of blocks all ranks have added the same share, and what is known can be kept.
 """
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from threading import Lock
 import numpy as np
 
 from carillon.command_line.progress import track
+from carillon.errors import UserError
 from forests.scaling import is_logarithmic
 from forests.training.blocks import WINDOW, in_order
 from forests.training.dataset import STUDIED, Dataset, Run, Samples, joined, rows_of
@@ -20,11 +22,14 @@ from forests.training.exact_sums import Sums, bits_of
 from forests.training.leaves import leaf_of, packed
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
+from forests.training.spent import Clock, Spent
 from forests.training.structure import Tree
+
+logger = logging.getLogger(__name__)
 
 SLICE_BLOCKS = 32
 """Blocks of a rank between two points at which all ranks have done the same share."""
-SAVE_SECONDS = 300.0
+KEEP_SECONDS = 300.0
 """Time between two times that sums are kept."""
 COSTLY = 20.0
 """Times as long as keeping them took, at least."""
@@ -42,8 +47,8 @@ class LeafSums:
     """Samples of the blocks done."""
     used: int = 0
     """Samples trained on."""
-    seconds: float = 0.0
-    """Wall time that it took."""
+    spent: Spent = Spent()
+    """Time that it took."""
 
 
 Keep = Callable[[LeafSums], None]
@@ -67,7 +72,7 @@ def add_samples(
     workers: int = 1,
     progress: bool = True,
     keep: Keep | None = None,
-    keep_seconds: float = SAVE_SECONDS,
+    keep_seconds: float = KEEP_SECONDS,
 ) -> None:
     """Add all samples that a state lacks, on all ranks; the state of the first one is the result.
 
@@ -78,12 +83,12 @@ def add_samples(
     keep
         Called on the first rank with what is known, about every `keep_seconds`.
     """
-    begin, before = time.monotonic(), state.seconds
+    clock = Clock()
     done = ranks.from_one(state.samples)
     adding = _Adding(state, dataset, training, trees)
     blocks = dataset.blocks(done)
     length = SLICE_BLOCKS * ranks.size
-    kept, cost = begin, 0.0
+    kept, cost = time.monotonic(), 0.0
 
     def added() -> Iterator[int]:
         nonlocal kept, cost
@@ -100,10 +105,13 @@ def add_samples(
                 if keep is None or not ranks.from_one(due):
                     continue
                 _gather(state, ranks)
-                state.seconds = before + time.monotonic() - begin
+                state.spent += clock.read()
                 if ranks.first:
                     start = time.monotonic()
-                    keep(state)
+                    try:
+                        keep(state)
+                    except UserError as error:
+                        logger.warning(f"{error}; the training goes on, with nothing kept of it")
                     kept = time.monotonic()
                     cost = kept - start
 
@@ -112,7 +120,7 @@ def add_samples(
         pass
     _gather(state, ranks)
     state.samples = dataset.count
-    state.seconds = before + time.monotonic() - begin
+    state.spent += clock.read()
 
 
 class _Adding:

@@ -1,6 +1,5 @@
 """Train both forests on fitted blocks and score them on blocks held out."""
 
-import time
 from dataclasses import asdict, replace
 from itertools import groupby
 from pathlib import Path
@@ -11,15 +10,16 @@ from forests.model import Model, save_model
 from forests.training.dataset import Dataset, Samples
 from forests.training.growing import KINDS, grow_trees
 from forests.training.kept import Kept
-from forests.training.leaf_fit import SAVE_SECONDS, add_samples, sums_of
+from forests.training.leaf_fit import KEEP_SECONDS, add_samples, sums_of
 from forests.training.leaves import Leaves, join, solve_leaves
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
 from forests.training.scores import held_out_scores, uniform_scores
+from forests.training.spent import Clock, Spent, peak_memory
 from forests.training.structure import Tree
 
-Grown = tuple[dict[int, Tree], float]
-"""Trees by number, and the seconds that growing them took."""
+Grown = tuple[dict[int, Tree], Spent]
+"""Trees by number, and the time that growing them took."""
 
 
 class Trained(NamedTuple):
@@ -42,7 +42,7 @@ def train_trees(
     progress: bool = True,
     grown: Grown | None = None,
     kept: Kept | None = None,
-    keep_seconds: float = SAVE_SECONDS,
+    keep_seconds: float = KEEP_SECONDS,
 ) -> Trained | None:
     """Both steps on several ranks, each with its share of the trees and of the samples.
 
@@ -56,7 +56,7 @@ def train_trees(
     kept
         Where trees and sums are kept, every so many `keep_seconds`, and taken from.
     """
-    trees, structure_seconds = grown or _grow(dataset, training, ranks, workers, progress, kept)
+    trees, growing = grown or _grow(dataset, training, ranks, workers, progress, kept)
     trees = {job: trees[job] for job in training.jobs}
     state = sums_of(trees, training)
     if kept is not None:
@@ -66,12 +66,15 @@ def train_trees(
     if not ranks.first:
         return None
     leaves = {job: solve_leaves(trees[job], state.sums[job], training.prior) for job in trees}
+    whole = growing + state.spent
     facts = {
-        "structure_seconds": structure_seconds,
-        "leaves_seconds": state.seconds,
-        "training_seconds": structure_seconds + state.seconds,
+        "structure_seconds": growing.seconds,
+        "leaves_seconds": state.spent.seconds,
+        "training_seconds": whole.seconds,
+        "processor_seconds": whole.processor_seconds,
+        "peak_memory_bytes": peak_memory(),
         "training_rows": 8 * state.used,
-        "rows_per_second": 8 * state.used / state.seconds,
+        "rows_per_second": 8 * state.used / state.spent.seconds,
         "ranks": ranks.size,
         "workers": workers,
     }
@@ -87,18 +90,17 @@ def _grow(
     kept: Kept | None,
 ) -> Grown:
     trees: dict[int, Tree] = {}
-    seconds = 0.0
+    spent, clock = Spent(), Clock()
     if kept is not None:
-        trees, seconds = ranks.agree(lambda: kept.trees(training.jobs))
+        trees, spent = ranks.agree(lambda: kept.trees(training.jobs))
     missing = [job for job in training.jobs if job not in trees]
-    begin = time.perf_counter()
     for job, tree in grow_trees(dataset, training, missing, ranks, workers, progress):
         trees[job] = tree
-        took, begin = time.perf_counter() - begin, time.perf_counter()
-        seconds += took
+        took = clock.read()
+        spent += took
         if kept is not None and ranks.first:
             kept.keep_tree(job, tree, took)
-    return trees, seconds
+    return trees, spent
 
 
 def model_of(dataset: Dataset, training: TrainingOptions, trained: Trained) -> Model:
@@ -133,7 +135,7 @@ def write_forests(
     workers: int = 1,
     progress: bool = True,
     grown: Grown | None = None,
-    keep_seconds: float = SAVE_SECONDS,
+    keep_seconds: float = KEEP_SECONDS,
 ) -> Model | None:
     """Train a model and write it; what is known is kept beside the file until it is there.
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,67 +13,69 @@ from carillon.files.datasets import INTEGER, REAL, read
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
 from forests.scaling import FEATURES, PATTERNS
+from forests.training.spent import Spent
 from forests.training.structure import Tree
 
 KIND = "tree"
-SCHEMA = 1
+SCHEMA = 2
 
 
 def save_tree(
-    path: str | Path, tree: Tree, job: int, parameters: dict[str, Any], seconds: float
+    path: str | Path, tree: Tree, job: int, parameters: dict[str, Any], spent: Spent
 ) -> None:
-    """Write tree number `job` of a training with these parameters, atomically.
+    """Write tree number `job` of a training with these parameters, and the time it took.
 
-    `seconds` is the wall time that it took to grow.
+    The file is complete or absent.
     """
     with create_h5(path, KIND, SCHEMA, sealed=True) as file:
         file.attrs["tree"] = job
-        file.attrs["seconds"] = seconds
+        file.attrs.update(asdict(spent))
         file.attrs["parameters"] = json.dumps(parameters, sort_keys=True)
         for field in fields(Tree):
             file.create_dataset(field.name, data=getattr(tree, field.name))
         provenance.write(file, parameters)
 
 
-def load_tree(path: str | Path, parameters: dict[str, Any]) -> tuple[int, Tree, float]:
-    """Number and splits of a tree, and the seconds that growing it took.
+def load_tree(path: str | Path, parameters: dict[str, Any]) -> tuple[int, Tree, Spent]:
+    """Number and splits of a tree, and the time that growing it took.
 
     Raises UserError if the file is missing, damaged or of another training.
     """
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:
-        job, seconds = int(file.attrs["tree"]), float(file.attrs["seconds"])
+        job = int(file.attrs["tree"])
+        spent = Spent(**{field.name: float(file.attrs[field.name]) for field in fields(Spent)})
         theirs = json.loads(str(file.attrs["parameters"]))
         kinds = {field.name: INTEGER for field in fields(Tree)} | {"threshold": REAL}
         tree = Tree(**{name: read(file, name, (None,), kind) for name, kind in kinds.items()})
     if theirs != json.loads(json.dumps(parameters)):
         raise UserError(f"{path}: {difference(theirs, parameters)}")
     _require_sound(path, tree)
-    return job, tree, seconds
+    return job, tree, spent
 
 
 def load_trees(
     paths: Sequence[str | Path], parameters: dict[str, Any]
-) -> tuple[dict[int, Tree], float]:
-    """Trees by number, and the seconds that growing them took in all.
+) -> tuple[dict[int, Tree], Spent]:
+    """Trees by number, and the time that growing them took in all.
 
     Raises UserError if a file is missing, damaged or of another training, or the trees are not each
     there once.
     """
     trees: dict[int, Tree] = {}
-    seconds = 0.0
+    spent = Spent()
     for path in paths:
         job, tree, took = load_tree(path, parameters)
         if job in trees:
             raise UserError(f"{path}: is tree {job}, which another file holds too")
         trees[job] = tree
-        seconds += took
+        spent += took
     numbers = set(range(2 * parameters["trees"]))
     if missing := sorted(numbers - set(trees)):
         raise UserError(
             f"tree {missing[0]} is missing, {len(trees)} of {len(numbers)} trees are named; grow "
             f"it with carillon grow --tree {missing[0]}"
         )
-    return trees, seconds
+    return trees, spent
 
 
 def difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:

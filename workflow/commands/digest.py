@@ -21,7 +21,7 @@ CIRCUMSTANCES = {
 not what was found."""
 TIMES = "history/seconds"
 """A dataset of wall times among others that are none."""
-OMITTED = CIRCUMSTANCES | {"seconds", "evaluations_per_minute", "workers"}
+OMITTED = CIRCUMSTANCES | {"seconds", "processor_seconds", "evaluations_per_minute", "workers"}
 """Attributes, and keys of texts in JSON, that tell circumstances."""
 
 
