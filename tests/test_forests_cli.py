@@ -88,3 +88,17 @@ def test_learning_curve_falls_with_the_rows(folder, capsys):
     assert plot.stat().st_size > 1000
     assert run("curve", *shards, "--rows", "1e3") == 0
     assert "rms error of log E" in capsys.readouterr().out
+
+
+def test_forests_of_a_curve_are_kept_and_taken_up(tmp_path, capsys):
+    data = ("--samples", 1000, "--rows", "2e3,8e3", "--folder", tmp_path / "curve")
+    assert run("curve", *data, "--json") == 0
+    first = json.loads(capsys.readouterr().out)
+    assert sorted(path.name for path in (tmp_path / "curve").iterdir()) == [
+        "forests-2000.h5",
+        "forests-8000.h5",
+    ]
+    assert run("curve", *data, "--json") == 0
+    assert json.loads(capsys.readouterr().out) == first
+    assert run("curve", *data, "--min-leaf", 20) == 2
+    assert "min_leaf 30 where 20 is asked for" in capsys.readouterr().err

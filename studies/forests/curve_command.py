@@ -1,6 +1,8 @@
 """Train on more and more rows, and follow the error."""
 
 import argparse
+import os
+from tempfile import TemporaryDirectory
 
 from carillon.command_line.outputs import require_outputs
 from carillon.parameters.command_line import collect
@@ -15,6 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_training(parser)
     parser.add_argument("--rows", default="1e5,3e5,1e6,3e6,1e7", help="(default %(default)s)")
+    parser.add_argument(
+        "--folder",
+        help="where the forests are kept: a later call takes them from there, or goes on",
+    )
     parser.add_argument("--plot", metavar="FILE", help="the curve, as .png, .svg or .pdf")
     add_workers(parser)
     add_outputs(parser)
@@ -26,7 +32,10 @@ def run(arguments: argparse.Namespace) -> None:
     how = collect(TrainingOptions, arguments)
     dataset = data_of(arguments, Ranks())
     counts = training.require_counts(arguments.rows)
-    rows = training.learning_curve(dataset, how, counts, arguments.workers)
+    with TemporaryDirectory() as temporary:
+        folder = arguments.folder or temporary
+        os.makedirs(folder, exist_ok=True)
+        rows = training.learning_curve(dataset, how, counts, folder, arguments.workers)
     if arguments.plot:
         from studies.forests.plots import save_curve  # matplotlib takes a while to load
 

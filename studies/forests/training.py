@@ -1,8 +1,10 @@
 """How the error depends on the rows trained on, and on how the trees are made."""
 
+import json
 import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,8 +15,9 @@ from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import LARGEST
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
+from forests.evaluate import coarsen
 from forests.layout import NODE
-from forests.model import RECORD
+from forests.model import RECORD, Model, load_model
 from forests.scaling import TRANSFORMS
 from forests.training.dataset import (
     STUDIED,
@@ -30,7 +33,8 @@ from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
-from forests.training.train import Trained, train_trees
+from forests.training.train import Trained, parameters_of, train_trees, write_forests
+from forests.training.tree_file import difference
 from studies.forests.config import VARIANTS
 
 logger = logging.getLogger(__name__)
@@ -40,6 +44,12 @@ TEST_SAMPLES = 20_000
 
 LEAST_RATIO = 1e-12
 """A regression of ratios may answer 0 or less, which has no logarithm: this is taken instead."""
+
+FACTS = (
+    *("structure_seconds", "leaves_seconds", "training_seconds", "processor_seconds"),
+    *("peak_memory_bytes", "training_rows", "rows_per_second", "ranks", "workers"),
+)
+"""What forests know of their training."""
 
 Row = dict[str, Any]
 
@@ -135,11 +145,17 @@ def variants(
 
 
 def learning_curve(
-    dataset: Dataset, training: TrainingOptions, rows: Sequence[int], workers: int = 1
+    dataset: Dataset,
+    training: TrainingOptions,
+    rows: Sequence[int],
+    folder: str | Path,
+    workers: int = 1,
 ) -> list[Row]:
     """Trainings on about so many rows of the dataset each, scored on fresh samples.
 
-    Raises UserError if the dataset has fewer rows than asked for.
+    Their forests are written to files in the folder, and taken from there where they are those of
+    an earlier call. A training that was killed goes on. Raises UserError if the dataset has fewer
+    rows than asked for.
     """
     available = 8 * dataset.count
     if max(rows) > available:
@@ -151,8 +167,37 @@ def learning_curve(
     for count in rows:
         part = dataset.thinned(-(-count // 8))
         logger.info(f"{8 * part.count:,} rows")
-        results.append({"rows": 8 * part.count, **_row(part, training, workers, test)})
+        model = _trained(Path(folder, f"forests-{8 * part.count}.h5"), part, training, workers)
+        results.append({"rows": 8 * part.count, **_model_row(model, test)})
     return results
+
+
+def _trained(path: Path, dataset: Dataset, training: TrainingOptions, workers: int) -> Model:
+    if not path.exists():
+        write_forests(path, dataset, training, Ranks(), workers)
+    model = load_model(path)
+    theirs = json.loads(model.provenance["parameters"])
+    mine = json.loads(json.dumps(parameters_of(dataset, training)))
+    if theirs != mine:
+        raise UserError(f"{path}: {difference(theirs, mine)}, or choose another folder")
+    return model
+
+
+def _model_row(model: Model, test: dict[str, Samples]) -> Row:
+    facts = {name: model.provenance[name] for name in FACTS}
+    return {
+        "leaves": len(model.forests.leaves),
+        "storage_bytes": model.forests.nodes.nbytes + model.forests.leaves.nbytes,
+        **{name: np.asarray(value).item() for name, value in facts.items()},
+        "scores": {
+            name: scores_of(
+                np.log(coarsen(model, samples.young) / samples.moduli),
+                samples.young,
+                samples.moduli,
+            )
+            for name, samples in test.items()
+        },
+    }
 
 
 def as_text(rows: Sequence[Row]) -> str:
