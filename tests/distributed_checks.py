@@ -7,6 +7,8 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import FrameType
@@ -27,6 +29,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.assembly.sparse import assembled
 from solver.assembly.system import Layout, assemble
+from solver.distribution import collective
 from solver.distribution.collective import receive_arrays, send_arrays, share_cores
 from solver.distribution.local_mesh import LocalMesh, distribute
 from solver.files.modes_file import write_modes
@@ -50,6 +53,18 @@ REPETITIONS = 3
 def on_first(model: Solid) -> Solid | None:
     """The model on rank 0 alone."""
     return model if COMM.rank == 0 else None
+
+
+@contextmanager
+def on_machines_of_their_own() -> Iterator[None]:
+    """The ranks as those of several machines, with half of them, or one, on the first."""
+
+    def machine_of(comm: MPI.Comm) -> MPI.Comm:
+        return comm.Split(2 * comm.rank // comm.size)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(collective, "machine_of", machine_of)
+        yield
 
 
 def shares_make_up_the_solid() -> None:
@@ -369,7 +384,9 @@ def groups_that_do_not_touch_can_be_merged() -> None:
 def missed_copies_are_found() -> None:
     model = solids.uniform_box(4, 4, 4, 0.01)
     exact = solids.dense_eigenvalues(model)
-    system = assemble(distribute(on_first(model), PARTS, comm=COMM), COMM)
+    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+    layout = Layout.of_local_mesh(local_mesh, COMM)
+    system = assemble(local_mesh, COMM, layout)
     start = system.gather(start_vector(system, 3)[:, None])
     if COMM.rank == 0:
         whole = replace(system, nodes=np.arange(model.mesh.n_nodes))
@@ -381,6 +398,11 @@ def missed_copies_are_found() -> None:
     )
     inertia = count_beyond(system, poorer)
     assert inertia.counted == inertia.computed + 2
+    linear = LinearSolver("multifrontal", layout)
+    assert count_beyond(system, poorer, linear.count_below) == inertia
+    with on_machines_of_their_own():
+        linear = LinearSolver("mumps", layout)
+    assert count_beyond(system, poorer, linear.count_below) == inertia
     again, inertia = complete(system, poorer, inertia)
     assert inertia.counted == inertia.computed
     assert again.added == 2
@@ -416,6 +438,53 @@ def one_rank_factorises_for_all() -> None:
     residual = system.times_stiffness(found) - shift * system.times_mass(found) - block
     assert np.abs(residual).max() < 1e-10
     inverse.destroy()
+
+
+def mumps_solves_and_counts_what_the_own_factorisation_does() -> None:
+    """On one rank when asked for, on several as those of several machines."""
+    model = solids.random_box(9, 6, 5)
+    values = solids.dense_eigenvalues(model)
+    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+    layout = Layout.of_local_mesh(local_mesh, COMM)
+    system = assemble(local_mesh, COMM, layout)
+    own = LinearSolver("multifrontal", layout)
+    with on_machines_of_their_own():
+        other = LinearSolver("auto" if COMM.size > 1 else "mumps", layout)
+    assert other.method == "mumps"
+    block = np.random.default_rng(COMM.rank).standard_normal((len(system.rigid), 5))
+    between = [(n, 0.5 * (values[n - 1] + values[n])) for n in (6, 12, 40, len(values) // 2)]
+    for below, shift in [(0, -0.1 * values[6]), *between, (len(values), 1.1 * values[-1])]:
+        found = []
+        for linear in (own, other):
+            inverse = linear.inverse(system, shift)
+            assert inverse.negative == linear.count_below(system, shift) == below
+            found.append(inverse.solve(block))
+            inverse.destroy()
+        largest = COMM.allreduce(float(np.abs(found[0]).max()), MPI.MAX)
+        assert np.abs(found[1] - found[0]).max() < 1e-8 * largest, below
+
+
+def modes_of_several_machines_are_those_of_one() -> None:
+    model = solids.random_box(9, 6, 5)
+    exact = solids.dense_eigenvalues(model)[6:30]
+    for method in ("hcms", "lanczos", "slepc"):
+        options = SolverOptions(modes=30, method=method, tolerance=1e-10, check_inertia=True)
+        with on_machines_of_their_own():
+            found = modal_analysis(on_first(model), options, COMM)
+        assert np.abs(found.values[6:] / exact - 1.0).max() < 1e-8, method
+        evidence = found.evidence
+        assert evidence["inertia_count"] == evidence["inertia_expected"] >= 30, method
+        assert evidence.get("linear_solver", "mumps") == "mumps" or COMM.size == 1
+
+
+def the_own_factorisation_is_refused_on_several_machines() -> None:
+    local_mesh = distribute(on_first(solids.random_box(4, 3, 2)), COMM.size, comm=COMM)
+    layout = Layout.of_local_mesh(local_mesh, COMM)
+    with (
+        on_machines_of_their_own(),
+        pytest.raises(UserError, match="multifrontal runs on one machine"),
+    ):
+        LinearSolver("multifrontal", layout)
 
 
 def others_sleep_while_one_works_alone() -> None:

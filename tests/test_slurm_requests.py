@@ -12,6 +12,8 @@ from workflow import patient_slurm
 from workflow.commands.estimate import load
 from workflow.estimate.jobs import plan
 
+pytestmark = pytest.mark.nightly(unless=("slurm", "workflow"))
+
 RANKS, CORES = 3, 8
 OF_RANK, OF_JOB = 901, 777
 CONFIG = f"""\

@@ -8,7 +8,7 @@ import pytest
 from solver.files.modes_file import read_modes
 from solver.verification.comparison import compare_files
 from tests.patience import HANG_SECONDS
-from tests.rank_counts import SEVERAL
+from tests.rank_counts import SEVERAL, TO_THREE
 
 pytestmark = pytest.mark.mpi
 
@@ -28,6 +28,17 @@ def truth(tmp_path_factory, run_cli) -> Path:
 def test_one_rank_factorises_for_its_machine(ranks, mpiexec):
     names = "one_rank_factorises_for_all,others_sleep_while_one_works_alone"
     mpiexec(ranks, PROGRAM, names, check=True)
+
+
+@pytest.mark.parametrize("ranks", TO_THREE)
+def test_ranks_of_several_machines_solve_count_and_prove_as_those_of_one(ranks, mpiexec):
+    several = ["the_own_factorisation_is_refused_on_several_machines"] if ranks > 1 else []
+    names = [
+        "mumps_solves_and_counts_what_the_own_factorisation_does",
+        "modes_of_several_machines_are_those_of_one",
+        *several,
+    ]
+    mpiexec(ranks, PROGRAM, ",".join(names), check=True)
 
 
 @pytest.mark.parametrize(

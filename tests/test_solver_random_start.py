@@ -21,7 +21,7 @@ from solver.correction.lobpcg import lobpcg
 from solver.correction.shift import LEAST, MOST, inverse_amid
 from solver.distribution.local_mesh import distribute
 from solver.linear import LinearSolver
-from solver.reference.truth import count_negative
+from solver.linear.factorisation import count_negative
 from solver.subspace.basis import BlockBasis
 from solver.subspace.start import start_block
 from solver.subspace.weyl import CountingLaw

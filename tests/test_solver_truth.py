@@ -18,8 +18,9 @@ from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
+from solver.linear.factorisation import count_negative
 from solver.reference import eigensolver
-from solver.reference.truth import complete, count_beyond, count_negative, solve_truth, start_vector
+from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from solver.verification.residuals import verify
 from tests import solids
 from tests.rank_counts import TO_THREE

@@ -3,6 +3,7 @@
 Traces of MPI in the environment would reach every job.
 """
 
+import os
 import re
 from subprocess import CompletedProcess
 
@@ -111,6 +112,23 @@ def test_a_job_counts_the_cores_of_the_run_and_not_those_of_its_node(cores, expe
     assert submission.cores_of_run(node, in_job=True) == 1
     assert submission.cores_of_run(cores, in_job=False) == expected
     assert submission.cores_of_run(node, in_job=True) == expected
+
+
+@pytest.mark.parametrize("by_srun", [True, False])
+def test_an_mpiexec_in_a_job_knows_the_nodes_that_the_executor_hides(by_srun, monkeypatch):
+    places = {"SLURM_NODELIST": "n[1-3]", "SLURM_TASKS_PER_NODE": "1(x3)"}
+    monkeypatch.setattr("os.environ", {"SLURM_JOB_ID": "7", **places})
+    submission.hand_on_places(not by_srun)
+    for name in places:
+        del os.environ[name]
+    submission.hand_on_places(not by_srun)
+    assert ({name: os.environ.get(name) for name in places} == places) != by_srun
+
+
+def test_a_job_of_another_cluster_has_no_nodes_to_hand_on(monkeypatch):
+    monkeypatch.setattr("os.environ", {})
+    submission.hand_on_places(True)
+    assert os.environ == {}
 
 
 def test_every_try_gets_twice_the_memory_for_each_rank(printed):

@@ -1,9 +1,10 @@
-"""What jobs of a cluster get beside the rules: the number of cores, and what they are started with.
+"""What jobs of a cluster get beside the rules: numbers of cores, nodes, and their command line.
 
 Snakemake hands the command line of a run on to its jobs in double quotes, in which a shell looks
 for `$`, backticks, quotes and backslashes.  Of a configuration that is but the name of its file.
 """
 
+import json
 import os
 import re
 from collections.abc import Iterable, Mapping
@@ -14,7 +15,12 @@ from carillon.errors import UserError
 
 _SPECIAL = re.compile(r"""["'$`\\\n]""")
 _PLAIN = re.compile(r"[\w@%+=:,./-]*", re.ASCII)
-_CORES = "CARILLON_RUN_CORES"
+_CORES, _ALLOCATION = "CARILLON_RUN_CORES", "CARILLON_SLURM_ALLOCATION"
+_PLACES = (
+    *("SLURM_NODELIST", "SLURM_JOB_NODELIST", "SLURM_NNODES", "SLURM_JOB_NUM_NODES"),
+    *("SLURM_NTASKS", "SLURM_NPROCS", "SLURM_TASKS_PER_NODE", "SLURM_JOB_CPUS_PER_NODE"),
+)
+"""Variables that tell `mpiexec` the nodes of a job of SLURM and how many ranks each takes."""
 
 
 def cores_of_run(cores: int | None, in_job: bool) -> int:
@@ -32,6 +38,19 @@ def cores_of_run(cores: int | None, in_job: bool) -> int:
     count = int(os.environ.get(_CORES, 1)) if in_job else cores or 1
     os.environ[_CORES] = str(count)
     return count
+
+
+def hand_on_places(starts_ranks: bool) -> None:
+    """Let an `mpiexec` in a job of SLURM know the job's nodes; called in each process of the job.
+
+    The executor removes SLURM's variables before it starts the process that runs the rule, where
+    `srun` would misread them. Their copy is put back there if something else `starts_ranks`.
+    """
+    here = {name: os.environ[name] for name in _PLACES if name in os.environ}
+    if here:
+        os.environ[_ALLOCATION] = json.dumps(here)
+    elif starts_ranks:
+        os.environ.update(json.loads(os.environ.get(_ALLOCATION, "{}")))
 
 
 def require_plain(paths: Iterable[str | Path], given: Mapping[str, Any]) -> None:

@@ -68,11 +68,11 @@ def completed(
     options: SolverOptions,
     phases: Phases,
     evidence: dict[str, Any],
-    count: Callable[[System, float], int | None] | None = None,
+    count: Callable[[System, float], int] | None = None,
 ) -> Truth:
     """`truth` with the modes that it lacked, which a count of the eigenvalues tells.
 
-    `count` counts the eigenvalues below a value; MUMPS does where it is None or gives None.
+    `count` counts the eigenvalues below a value; MUMPS does where it is None.
     """
     inertia = None
     if can_count():

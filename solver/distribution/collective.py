@@ -68,9 +68,17 @@ def optional(comm: MPI.Comm, warning: str, compute: Callable[[], T]) -> T | None
         return None
 
 
+def machine_of(comm: MPI.Comm) -> MPI.Comm:
+    """The ranks that have the memory of this one, to be freed by the caller; collective.
+
+    All that depends on machines asks here, so that the ranks of one can be tried as those of many.
+    """
+    return comm.Split_type(MPI.COMM_TYPE_SHARED)
+
+
 def ranks_of_machine(comm: MPI.Comm) -> int:
     """How many of the ranks have the memory of this one; collective."""
-    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    machine = machine_of(comm)
     try:
         return int(machine.size)
     finally:
@@ -82,7 +90,7 @@ def share_cores(comm: MPI.Comm) -> int:
 
     A launcher may have bound every rank to cores of its own, or all to the same ones.
     """
-    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    machine = machine_of(comm)
     try:
         cores = set[int]().union(*machine.allgather(os.sched_getaffinity(0)))
         return limit_threads(machine.size, len(cores))

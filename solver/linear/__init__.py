@@ -165,9 +165,16 @@ class LinearSolver:
 
         return bcast_from_root(self._layout.comm, fits)
 
-    def count_below(self, system: System, value: float) -> int | None:
-        """Eigenvalues of K - value M below zero, by inertia; None where that is MUMPS's to do."""
-        return self.leader.count_below(system, value) if self._together else None
+    def count_below(self, system: System, value: float) -> int:
+        """Eigenvalues of K - value M below zero, by inertia; collective.
+
+        Ranks of several machines need MUMPS for it: raises UserError where PETSc has none.
+        """
+        if self._together:
+            return self.leader.count_below(system, value)
+        from solver.linear.factorisation import count_negative
+
+        return count_negative(system.K, system.M, value)
 
     @property
     def indefinite(self) -> bool:

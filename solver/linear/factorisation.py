@@ -18,8 +18,9 @@ _TOO_LITTLE_ROOM = (-8, -9, -17, -20)
 """Values of MUMPS's INFOG(1) if the memory was too little."""
 COLUMNS = 128
 """Number of right-hand sides that MUMPS carries through its factor together."""
-_ROOM, _BLOCKING, _ROOT_ON_ONE = 14, 27, 13
-"""MUMPS's controls of these, and of whether the root of the tree lies on one rank."""
+_ROOM, _BLOCKING, _ROOT_ON_ONE, _NULL_PIVOTS = 14, 27, 13, 24
+"""MUMPS's controls of these, of whether the root of the tree lies on one rank, and of whether it
+looks for pivots that are zero."""
 FILL_LEVELS = 0
 """Levels of fill of the factor; 0 keeps the pattern of the matrix."""
 
@@ -108,6 +109,23 @@ def solve_dense(factor: PETSc.Mat, block: Array, unknowns: int, comm: Any) -> Ar
     for view in views:
         view.destroy()
     return solutions
+
+
+def count_negative(K: PETSc.Mat, M: PETSc.Mat, value: float) -> int:
+    """Negative eigenvalues of K - value M, by Sylvester's law of inertia and MUMPS; collective.
+
+    The arguments are K and M on any number of ranks. Raises UserError on several ranks without
+    MUMPS, and ConvergenceError if the factorisation fails.
+    """
+    shifted = K.copy()
+    shifted.axpy(-value, M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
+    factorisation = factorised(shifted, {_ROOT_ON_ONE: 1, _NULL_PIVOTS: 1})
+    negative, _, _ = factorisation.getFactorMatrix().getInertia()
+    factorisation.destroy()
+    shifted.destroy()
+    return int(negative)
 
 
 def _failure(matrix: PETSc.Mat, cause: str) -> ConvergenceError:

@@ -10,7 +10,7 @@ from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
 from carillon.processes.petsc import PETSc
 from solver.assembly.system import System
-from solver.linear.factorisation import factorised
+from solver.linear.factorisation import count_negative
 from solver.reference.eigensolver import smallest_eigenpairs
 from solver.subspace.rayleigh_ritz import is_orthonormal, rayleigh_ritz, rigid_pairs, safe_shift
 from solver.subspace.start import start_vector
@@ -96,16 +96,14 @@ def can_count() -> bool:
 
 
 def count_beyond(
-    system: System, truth: Truth, count: Callable[[System, float], int | None] | None = None
+    system: System, truth: Truth, count: Callable[[System, float], int] | None = None
 ) -> Inertia:
     """Count, by the inertia of K - mu M, the eigenvalues below a mu beyond the last wanted one.
 
-    The shift mu lies in the widest gap among the spare modes.  MUMPS counts, unless `count` can.
+    The shift mu lies in the widest gap among the spare modes.  MUMPS counts, unless `count` does.
     """
     value, computed = _gap(truth.values, truth.modes, system.n_dofs)
-    counted = None if count is None else count(system, value)
-    if counted is None:
-        counted = count_negative(system.K, system.M, value)
+    counted = count(system, value) if count else count_negative(system.K, system.M, value)
     return Inertia(value, counted, computed)
 
 
@@ -209,16 +207,3 @@ def _gap(values: Array, modes: int, n_dofs: int) -> tuple[float, int]:
     gaps = np.divide(np.diff(values[modes - 1 :]), above, np.zeros(len(above)), where=above > 0.0)
     widest = int(np.argmax(gaps)) + modes
     return float(0.5 * (values[widest - 1] + values[widest])), widest
-
-
-def count_negative(K: PETSc.Mat, M: PETSc.Mat, value: float) -> int:
-    """Negative eigenvalues of K - value M, by Sylvester's law of inertia and MUMPS."""
-    shifted = K.copy()
-    shifted.axpy(-value, M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    shifted.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    # Inertia needs the root of the elimination tree on one rank, and its null pivots detected.
-    factorisation = factorised(shifted, {13: 1, 24: 1})
-    negative, _, _ = factorisation.getFactorMatrix().getInertia()
-    factorisation.destroy()
-    shifted.destroy()
-    return int(negative)

@@ -17,8 +17,8 @@ from solver.assembly.sparse import assembled
 from solver.assembly.system import assemble, distributed_matrix
 from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import ModesFile
-from solver.linear.factorisation import factorised, solve_dense
-from solver.reference.truth import can_count, count_negative
+from solver.linear.factorisation import count_negative, factorised, solve_dense
+from solver.reference.truth import can_count
 from solver.subspace.rayleigh_ritz import first_elastic_estimate
 from solver.verification.residuals import (
     COLUMNS_AT_ONCE,

@@ -23,8 +23,12 @@ RUN_CORES = config["solver"]["cores"] or min(ALL_CORES, max(RANKS, ALL_CORES // 
 # What starts ranks, in a job of SLURM its own.
 ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
 LAUNCHER = config["solver"]["launcher"] or ANY_LAUNCHER
-# The executor hides from srun how many cores a rank has; without them it may bind ranks to one.
-TELLS_CORES = workflow.remote_exec and Path(shlex.split(LAUNCHER)[0]).name == "srun"
+# The executor hides from what starts ranks how many cores they have and on which nodes they are: srun
+# would bind each to one core, and mpiexec fail.
+BY_SRUN = Path(shlex.split(LAUNCHER)[0]).name == "srun"
+TELLS_CORES = workflow.remote_exec and BY_SRUN
+if workflow.remote_exec:
+    submission.hand_on_places(not BY_SRUN)
 
 
 def resources_of(ranks, cores):
