@@ -155,13 +155,14 @@ class Journal:
 
     def _own(self) -> None:
         """Make the journal this process's alone, cut off after the last good frame, and say so."""
-        if self._owner.get("machine") == machine() and is_exclusive(self._file):
+        here = machine()
+        if here and self._owner.get("machine") == here and is_exclusive(self._file):
             os.ftruncate(self._file, self._end)
         else:
             self._file = take_over(self.path, self._file, self._end)
         if self._end == 0:
             self._write(self._beginning())
-        owner = {"host": socket.gethostname(), "process": os.getpid(), "machine": machine()}
+        owner = {"host": socket.gethostname(), "process": os.getpid(), "machine": here}
         self._append(_OWNER, json.dumps(owner).encode())
 
     def _require_new(self) -> None:

@@ -106,9 +106,12 @@ def is_exclusive(file: int) -> bool:
     return True
 
 
-def machine() -> str:
-    """What the locks of a file that is kept to one machine have in common: this kernel's start."""
-    return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+def machine() -> str | None:
+    """Name of this start of the kernel, which keeps all locks of a machine; None if it has none."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    except OSError:
+        return None
 
 
 def take_over(name: Path, file: int, length: int) -> int:
