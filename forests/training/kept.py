@@ -7,7 +7,7 @@ the leaves over the samples that were added.
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 from carillon.errors import UserError
 from carillon.files.datasets import INTEGER, REAL, read
 from carillon.files.hdf5 import create_h5, open_h5
+from carillon.files.paths import cause
 from forests.training.dataset import Samples
 from forests.training.exact_sums import Sums
 from forests.training.leaf_fit import LeafSums
@@ -61,13 +62,12 @@ class Kept:
 
     def keep_tree(self, job: int, tree: Tree, spent: Spent) -> None:
         """Write a tree that was grown."""
-        self.folder.mkdir(exist_ok=True)
-        save_tree(self._tree(job), tree, job, self._parameters, spent)
+        with self._made():
+            save_tree(self._tree(job), tree, job, self._parameters, spent)
 
     def keep_sums(self, state: LeafSums) -> None:
         """Write what is known of the leaves; what was there before is replaced at the end."""
-        self.folder.mkdir(exist_ok=True)
-        with create_h5(self._sums, KIND, SCHEMA, sealed=True) as file:
+        with self._made(), create_h5(self._sums, KIND, SCHEMA, sealed=True) as file:
             file.attrs["parameters"] = json.dumps(self._parameters, sort_keys=True)
             file.attrs.update({"samples": state.samples, "used": state.used} | asdict(state.spent))
             for name, values in state.held_out._asdict().items():
@@ -102,6 +102,18 @@ class Kept:
     def remove(self) -> None:
         """Remove all that was kept."""
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    @contextmanager
+    def _made(self) -> Iterator[None]:
+        """The folder, which is not left behind with nothing in it."""
+        try:
+            self.folder.mkdir(exist_ok=True)
+            yield
+        except OSError as error:
+            raise UserError(f"{self.folder}: cannot be written ({cause(error)})") from None
+        finally:
+            with suppress(OSError):
+                self.folder.rmdir()
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

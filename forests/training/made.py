@@ -1,5 +1,6 @@
 """Samples that a training draws and fits itself: how many, of which moduli, fitted how."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Annotated, Any
@@ -13,6 +14,8 @@ from dataset_gen.sampling import DISTRIBUTIONS
 from dataset_gen.settings import Settings, ShardOptions, settings_of
 from forests.training.dataset import Dataset, made_dataset, open_dataset
 
+_COUNT = re.compile(r"[0-9]{1,19}(\.[0-9]{1,19})?(e\+?[0-9]{1,2})?", re.ASCII | re.IGNORECASE)
+
 
 def whole_number(text: str) -> int:
     """A count such as 1250000000 or 1.25e9.
@@ -24,16 +27,8 @@ def whole_number(text: str) -> int:
     >>> whole_number("1.25e9"), whole_number("3000")
     (1250000000, 3000)
     """
-    try:
-        return int(text)
-    except ValueError:
-        pass
-    try:
-        number = float(text)
-        if number == int(number):
-            return int(number)
-    except (ValueError, OverflowError):
-        pass
+    if _COUNT.fullmatch(text) and float(text).is_integer():
+        return int(text) if text.isdigit() else int(float(text))
     raise ValueError(f"found {text!r:.60}, expected a whole number such as 3000 or 1.25e9")
 
 

@@ -10,7 +10,14 @@ GROW = "grow ZOO/shard.h5 --trees 1 --depth 3 --tree 0 --out t.h5"
 
 hostile("nothing at all", "", "command")
 hostile("no such command", "plant", "plant")
-hostile("no shards", "train --out f.h5", "dataset")
+hostile("no shards", "train --out f.h5", "neither shards nor --samples")
+hostile("shards and samples", "train ZOO/shard.h5 --samples 1e3 --out f.h5", "one of both")
+each(
+    "samples",
+    "train --samples VALUE --out f.h5",
+    (*(text for text in NO_WHOLE_NUMBERS if text != "1e3"), "0", "-1", "1e30", "1.5e0"),
+    "samples",
+)
 hostile("no out", "train ZOO/shard.h5", "--out")
 for option, values in {
     "trees": (*NO_WHOLE_NUMBERS, "0", "-1", "10000000000", str(10**30)),
