@@ -42,14 +42,14 @@ def run(arguments: argparse.Namespace) -> None:
     clock = Clock()
     job = arguments.tree
     ((_, tree),) = grow_trees(dataset, training, [job], ranks, arguments.workers)
+    spent, peak = clock.read(), max(ranks.in_order([peak_memory()]))
     if not ranks.first:
         return
-    spent = clock.read()
     save_tree(arguments.out, tree, job, parameters_of(dataset, training), spent)
     say(
         f"{arguments.out}: tree {job}, {tree.leaves:,} leaves, depth {tree.depth}; "
         f"{spent.seconds:.1f} s, {spent.processor_seconds:.1f} s of processor time, peak memory "
-        f"{peak_memory() / 1e6:,.0f} MB"
+        f"{peak / 1e6:,.0f} MB{' of a rank' if ranks.size > 1 else ''}"
     )
 
 

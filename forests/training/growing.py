@@ -56,13 +56,12 @@ def grow_trees(
     Every rank gets every tree. A tree depends on the dataset, the parameters and its number alone.
     Raises UserError if there are too few rows with a void or with a filled origin.
     """
+    if training.grower != LINEAR:
+        yield from _by_estimators(dataset, training, list(jobs), ranks, workers, progress)
+        return
     subset = _Subset(dataset, training, ranks, workers, progress and ranks.first)
     for job in jobs:
-        if training.grower == LINEAR:
-            tree = subset.grown(job)
-        else:
-            tree = _by_estimator(dataset, training, job, ranks, progress)
-        yield job, tree
+        yield job, subset.grown(job)
 
 
 def key_of(training: TrainingOptions, job: int) -> int:
@@ -71,23 +70,36 @@ def key_of(training: TrainingOptions, job: int) -> int:
     return int(sequence.generate_state(1, np.uint64)[0])
 
 
-def _by_estimator(
-    dataset: Dataset, training: TrainingOptions, job: int, ranks: Ranks, progress: bool
-) -> Tree:
-    """A tree of scikit-learn's, which needs all rows in one process: that of one of the ranks."""
+def _by_estimators(
+    dataset: Dataset,
+    training: TrainingOptions,
+    jobs: list[int],
+    ranks: Ranks,
+    workers: int,
+    progress: bool,
+) -> Iterator[tuple[int, Tree]]:
+    """Trees of scikit-learn's: each needs all rows in one process, and grows in a thread."""
+    own = list(ranks.own(jobs))
 
-    def grow() -> Tree | None:
-        if job % ranks.size != ranks.rank:
-            return None
-        kind = training.kind(job)
+    def prepared() -> tuple[Rows, Rows]:
         subset = dataset.subset(training.structure_rows // 8)
-        rows = rows_of(subset, training.transform, training.uniform_weight)[kind]
-        require_rows(len(rows), kind, training, progress and job % training.trees == 0)
-        return GROWERS[training.grower](rows, training.limits, key_of(training, job) >> 33)
+        rows = rows_of(subset, training.transform, training.uniform_weight)
+        for kind in sorted({training.kind(job) for job in own}):
+            shown = progress and own[0] == kind * training.trees
+            require_rows(len(rows[kind]), kind, training, shown)
+        return rows
 
-    tree = ranks.from_one(ranks.agree(grow), job % ranks.size)
-    assert tree is not None
-    return tree
+    rows = ranks.agree(prepared)
+
+    def grow(job: int) -> Tree:
+        kind, seed = training.kind(job), key_of(training, job) >> 33
+        return GROWERS[training.grower](rows[kind], training.limits, seed)
+
+    with ThreadPoolExecutor(workers) as pool:
+        grown = in_order(pool, grow, own, workers)
+        shown = progress and ranks.first
+        mine = list(zip(own, track(grown, "growing", len(own), "trees", shown), strict=True))
+    yield from sorted(ranks.everywhere(mine), key=lambda pair: pair[0])
 
 
 def require_rows(count: int, kind: int, training: TrainingOptions, visible: bool) -> None:
@@ -128,6 +140,13 @@ class _Held:
         self.records.resize((before + len(records), RECORD), refcheck=False)
         self.marks.resize(before + len(records), refcheck=False)
         self.records[before:], self.marks[before:] = records, marks
+
+    def divided(self, owners: Index, ranks: int) -> list["_Held"]:
+        """The rows of each rank, `owners` being the ranks of the subtrees."""
+        owner = owners[self.marks]
+        order = np.argsort(owner, kind="stable")
+        ends = np.cumsum(np.bincount(owner, minlength=ranks))[:-1]
+        return [_Held(self.records[part], self.marks[part]) for part in np.split(order, ends)]
 
 
 class _Subset:
@@ -221,24 +240,19 @@ class _Subset:
         return _Held(self._held.records, numbers)
 
     def _exchanged(self, top: Top, owners: Index) -> _Held:
+        """Rows that all ranks have sent to this one, in the order of the dataset."""
         held, walked = _Held.nothing(), packed(top.tree)
         samples = self._training.structure_rows // 8
         turns = -(-len(self._dataset.spread(samples)) // self._ranks.size)
         blocks = self._tracked(self._blocks(samples))
         for _ in range(turns):
             rows = next(blocks, None)
-            parts = [(np.empty((0, RECORD), dtype=np.float32), np.empty(0, dtype=np.uint16))]
-            parts *= self._ranks.size
+            own = _Held.nothing()
             if rows is not None:
-                records = records_of(rows)
-                numbers = leaf_of(walked, records, rows.pattern).astype(np.uint16)
-                owner = owners[numbers]
-                parts = [
-                    (records[owner == rank], numbers[owner == rank])
-                    for rank in range(self._ranks.size)
-                ]
-            for received in self._ranks.exchanged(parts):
-                held.add(*received)
+                numbers = leaf_of(walked, rows.features, rows.pattern)
+                own.add(records_of(rows), numbers.astype(np.uint16))
+            for received in self._ranks.exchanged(own.divided(owners, self._ranks.size)):
+                held.add(received.records, received.marks)
         return held
 
     def _tracked(self, blocks: Iterator[Rows]) -> Iterator[Rows]:

@@ -53,6 +53,10 @@ class Ranks:
         parts: list[list[T]] | None = self._comm.gather(mine)
         return mine if parts is None else [item for part in parts for item in part]
 
+    def everywhere(self, mine: list[T]) -> list[T]:
+        """The lists of all ranks one after the other, on every rank."""
+        return self.from_one(self.in_order(mine))
+
     def add_up(self, sums: Sums) -> None:
         """Add the sums of all ranks on the first one; those of the others are nothing then."""
         if self._comm is None:
