@@ -4,9 +4,12 @@ import pytest
 import yaml
 
 from carillon.errors import UserError
-from tests.workflow_runs import LAPTOP, planned
+from tests.workflow_runs import LAPTOP, planned, snakemake
 from workflow import settings, training
+from workflow.commands.digest import digest
 from workflow.configuration.whole import completed
+
+FORESTS = "results/forests/forests.h5"
 
 
 def config(**dataset) -> dict:
@@ -29,6 +32,50 @@ def test_a_range_is_that_of_its_distribution_alone():
     plan = training.own(config(ranges={"uniform": [1, 20]}))
     assert plan.generate_arguments("uniform", 0)[-4:] == ["--low", "1", "--high", "20"]
     assert "--low" not in plan.generate_arguments("log-uniform", 0)
+
+
+def test_samples_that_are_not_stored_are_those_of_the_shards():
+    plan = training.own(config(store=False, samples=1000, ranges={"uniform": [1, 20]}))
+    assert plan.shards == [] and "--checked" not in plan.train_arguments
+    text = " ".join(plan.train_arguments)
+    assert "--samples 1000 --data-seed 0 --objective calibrated" in text
+    assert "--distributions uniform:1:20 log-uniform --trees 3" in text
+
+
+def test_without_shards_nothing_else_of_the_run_is_missing(dry_run, tmp_path):
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(config(store=False)))
+    jobs = planned(dry_run(tmp_path, "-p", "--cores", 1, "--configfile", "config.yaml"))
+    assert jobs["grow_tree"] == 6 and jobs["train_forests"] == 1
+    assert not {"generate_shard", "describe_shard"} & set(jobs)
+
+
+@pytest.mark.nightly
+def test_a_run_makes_the_same_forests_with_and_without_shards(tmp_path):
+    digests = set()
+    for store in (True, False):
+        folder = tmp_path / f"store-{store}"
+        folder.mkdir()
+        values = {
+            "models": {"bar": {"mesh": "builtin:bar", "resolution": 12}},
+            "dataset": {"samples": 2000, "shards": 1, "store": store},
+            "forests": {"trees": 1, "ranks": 1 if store else 2, "threads": 1},
+        }
+        (folder / "config.yaml").write_text(yaml.safe_dump(values))
+        run = snakemake(folder, FORESTS, "--cores", 2, "--configfile", "config.yaml")
+        assert run.returncode == 0, run.stdout + run.stderr
+        digests.add(digest(folder / FORESTS))
+        assert (folder / "results" / "dataset").exists() == store
+    assert len(digests) == 1
+
+
+@pytest.mark.parametrize(
+    ("forests", "usual", "cores"),
+    [({}, 8, 8), ({"ranks": 3}, 8, 3), ({"ranks": 3, "threads": 4}, 8, 12), ({"threads": 2}, 8, 2)],
+)
+def test_ranks_and_threads_are_the_cores_of_a_job(forests, usual, cores):
+    loaded = config()
+    loaded["forests"] |= forests
+    assert training.own(loaded).cores(usual) == cores
 
 
 def test_every_parameter_of_the_training_is_passed_on():
