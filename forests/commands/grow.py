@@ -17,7 +17,7 @@ from forests.training.dataset import Dataset
 from forests.training.growing import grow_trees
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
-from forests.training.spent import Clock, peak_memory
+from forests.training.spent import Stopwatch, peak_memory
 from forests.training.train import parameters_of
 from forests.training.tree_file import save_tree
 
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Grow one tree and write it, together with the other ranks of the job if there are any."""
     ranks = Ranks(world())
     training, dataset = ranks.agree(lambda: _opened(arguments, ranks))
-    clock = Clock()
+    clock = Stopwatch()
     job = arguments.tree
     ((_, tree),) = grow_trees(dataset, training, [job], ranks, arguments.workers)
     spent, peak = clock.read(), max(ranks.in_order([peak_memory()]))

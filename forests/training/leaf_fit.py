@@ -22,7 +22,7 @@ from forests.training.exact_sums import Sums, bits_of
 from forests.training.leaves import leaf_of, packed
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
-from forests.training.spent import Clock, Spent
+from forests.training.spent import Spent, Stopwatch
 from forests.training.structure import Tree
 
 logger = logging.getLogger(__name__)
@@ -83,7 +83,7 @@ def add_samples(
     keep
         Called on the first rank with what is known, about every `keep_seconds`.
     """
-    clock = Clock()
+    clock = Stopwatch()
     done = ranks.from_one(state.samples)
     adding = _Adding(state, dataset, training, trees)
     blocks = dataset.blocks(done)

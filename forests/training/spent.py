@@ -18,7 +18,7 @@ class Spent:
         return Spent(self.seconds + other.seconds, self.processor_seconds + other.processor_seconds)
 
 
-class Clock:
+class Stopwatch:
     """Runs from when it is made, or from the last reading on."""
 
     def __init__(self) -> None:

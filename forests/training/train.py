@@ -15,7 +15,7 @@ from forests.training.leaves import Leaves, join, solve_leaves
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
 from forests.training.scores import held_out_scores, uniform_scores
-from forests.training.spent import Clock, Spent, peak_memory
+from forests.training.spent import Spent, Stopwatch, peak_memory
 from forests.training.structure import Tree
 
 Grown = tuple[dict[int, Tree], Spent]
@@ -90,7 +90,7 @@ def _grow(
     kept: Kept | None,
 ) -> Grown:
     trees: dict[int, Tree] = {}
-    spent, clock = Spent(), Clock()
+    spent, clock = Spent(), Stopwatch()
     if kept is not None:
         trees, spent = ranks.agree(lambda: kept.trees(training.jobs))
     missing = [job for job in training.jobs if job not in trees]
