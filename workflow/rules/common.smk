@@ -32,12 +32,13 @@ if workflow.remote_exec:
 
 
 def resources_of(ranks, cores):
-    """Ranks, their share of the cores, and as `mpi` what goes in front of a program on several ranks.
+    """Ranks, their share of the cores, and if they are several, as `mpi`, what starts them.
 
-    The words of `mpi` are quoted here, as it is the one thing that goes to a shell as it is.
+    The words of `mpi` are quoted here, as it is the one thing that goes to a shell as it is. Of an
+    array with this resource, empty or not, SLURM's executor runs the first job only.
     """
-    launcher = quoted(LAUNCHER) if ranks > 1 else ""
-    return {"mpi": launcher, "tasks": ranks, "cpus_per_task": max(1, cores // ranks)}
+    launcher = {"mpi": quoted(LAUNCHER)} if ranks > 1 else {}
+    return {"tasks": ranks, "cpus_per_task": max(1, cores // ranks), **launcher}
 
 
 def python_on(ranks):
