@@ -36,10 +36,11 @@ def test_a_range_is_that_of_its_distribution_alone():
 
 def test_samples_that_are_not_stored_are_those_of_the_shards():
     plan = training.own(config(store=False, samples=1000, ranges={"uniform": [1, 20]}))
-    assert plan.shards == [] and "--checked" not in plan.train_arguments
-    text = " ".join(plan.train_arguments)
-    assert "--samples 1000 --data-seed 0 --objective calibrated" in text
-    assert "--distributions uniform:1:20 log-uniform --trees 3" in text
+    assert plan.shards == []
+    text = " ".join(plan.data_arguments)
+    assert text.startswith("--samples 1000 --data-seed 0 --objective calibrated")
+    assert text.endswith("--distributions uniform:1:20 log-uniform")
+    assert training.own(config()).data_arguments == ["--checked"]
 
 
 def test_without_shards_nothing_else_of_the_run_is_missing(dry_run, tmp_path):

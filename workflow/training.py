@@ -56,12 +56,9 @@ class Training:
 
     @property
     def data_arguments(self) -> list[str]:
-        """Arguments of `forests grow` and `forests train` beside the shards, if there are any.
-
-        Another job of the run has checked these.
-        """
+        """Arguments of `forests grow` and `forests train` beside the shards, if there are any."""
         if self.dataset["store"]:
-            return ["--checked"]
+            return ["--checked"]  # by the job that describes each
         ranges = self.dataset["ranges"]
         distributions = [
             ":".join(map(str, (name, *ranges.get(name, ())))) for name in self.distributions
@@ -72,8 +69,8 @@ class Training:
 
     @property
     def train_arguments(self) -> list[str]:
-        """Arguments of `forests grow` and `forests train` that say from what, and how."""
-        return self.data_arguments + options({name: self.forests[name] for name in TRAINING})
+        """Arguments of `forests grow` and `forests train` that say how."""
+        return options({name: self.forests[name] for name in TRAINING})
 
     def cores(self, usual: int) -> int:
         """Cores of a job that grows a tree or fits leaves; `usual`: those of a single process."""

@@ -6,6 +6,10 @@ STUDIED_FORESTS = (
     settings.forest_files(config["forests_study"]["model"]) or f"{DEFAULT_FOLDER}/forests.h5"
 )
 STUDY_TRAINING = forests_study.trainings(config)
+STUDIED_SHARDS = expand(
+    f"{DEFAULT_FOLDER}/dataset/{{name}}.h5",
+    name=DEFAULT.first_shards(config["forests_study"]["shards"]),
+)
 
 
 use rule describe_forests as describe_studied_forests with:
@@ -53,10 +57,8 @@ rule benchmark_forests:
 
 rule compare_trainings:
     input:
-        expand(
-            f"{DEFAULT_FOLDER}/dataset/{{name}}.h5",
-            name=DEFAULT.first_shards(config["forests_study"]["shards"]),
-        ),
+        shards=STUDIED_SHARDS,
+        checked=checked(STUDIED_SHARDS),
     output:
         f"{FORESTS_STUDY}/variants.json",
     log:
@@ -76,13 +78,14 @@ rule compare_trainings:
             for word in options({"only": name})
         ],
     shell:
-        "python -m carillon study variants {input:q} {params.training:q} --max-leaves {params.leaves:q}"
-        " {params.variants:q} --workers {threads} --out {output:q} > {log:q} 2>&1"
+        "python -m carillon study variants {input.shards:q} --checked {params.training:q}"
+        " --max-leaves {params.leaves:q} {params.variants:q} --workers {threads} --out {output:q} > {log:q} 2>&1"
 
 
 rule follow_learning:
     input:
-        DEFAULT_SHARDS,
+        shards=DEFAULT_SHARDS,
+        checked=checked(DEFAULT_SHARDS),
     output:
         f"{FORESTS_STUDY}/curve.json",
     log:
@@ -94,8 +97,9 @@ rule follow_learning:
         **limits("follow_learning"),
     params:
         source=source("studies.forests.curve_command"),
+        data=STUDY_TRAINING.data_arguments,
         training=STUDY_TRAINING.train_arguments,
         rows=",".join(map(str, config["forests_study"]["curve_rows"])),
     shell:
-        "python -m carillon study curve {input:q} {params.training:q} --rows {params.rows:q}"
-        " --workers {threads} --out {output:q} > {log:q} 2>&1"
+        "python -m carillon study curve {input.shards:q} {params.data:q} {params.training:q}"
+        " --rows {params.rows:q} --workers {threads} --out {output:q} > {log:q} 2>&1"

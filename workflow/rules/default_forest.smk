@@ -54,6 +54,7 @@ use rule grow_tree as grow_default_tree with:
         **tree_limits("grow_default_tree", DEFAULT),
     params:
         source=source("forests.commands.grow"),
+        data=DEFAULT.data_arguments,
         training=DEFAULT.train_arguments,
 
 
@@ -73,6 +74,7 @@ use rule train_forests as train_default_forest with:
         **leaves_limits("train_default_forest", DEFAULT),
     params:
         source=source("forests.commands.train"),
+        data=DEFAULT.data_arguments,
         training=DEFAULT.train_arguments,
 
 

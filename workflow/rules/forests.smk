@@ -24,9 +24,14 @@ rule grow_tree:
         **tree_limits("grow_tree", OWN),
     params:
         source=source("forests.commands.grow"),
+        data=OWN.data_arguments,
         training=OWN.train_arguments,
     shell:
-        trees_command(OWN, "grow", "{input.shards:q} {params.training:q} --tree {wildcards.tree:q}")
+        trees_command(
+            OWN,
+            "grow",
+            "{input.shards:q} {params.data:q} {params.training:q} --tree {wildcards.tree:q}",
+        )
 
 
 rule train_forests:
@@ -46,10 +51,13 @@ rule train_forests:
         **leaves_limits("train_forests", OWN),
     params:
         source=source("forests.commands.train"),
+        data=OWN.data_arguments,
         training=OWN.train_arguments,
     shell:
         trees_command(
-            OWN, "train", "{input.shards:q} {params.training:q} --structure {input.trees:q}"
+            OWN,
+            "train",
+            "{input.shards:q} {params.data:q} {params.training:q} --structure {input.trees:q}",
         )
 
 
