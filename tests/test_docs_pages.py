@@ -119,7 +119,9 @@ def in_code(pattern: str) -> list[tuple[Path, str]]:
     return [(page, text) for page, code in codes for text in re.findall(pattern, code)]
 
 
-OTHERS = {"--mpi", "--unlock", "--oversubscribe", "--tier", "--durations", "--measured"}
+OTHERS = {"--mpi", "--unlock", "--snakefile", "--directory", "--oversubscribe"} | {
+    *("--tier", "--durations", "--measured")
+}
 """Options of other programs that pages name."""
 
 

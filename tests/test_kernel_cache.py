@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from numba.core import caching
 
 from carillon.processes import kernel_cache
 from tests.programs import python
@@ -23,28 +24,28 @@ from carillon.command_line import logs
 logs.show()
 kernel_cache.PLACES = ()
 from numba.core import caching
-beside = sys.argv[1] == "beside"
-caching.CacheImpl._locator_classes = [caching.InTreeCacheLocator] if beside else []
+places = {"beside": [caching.InTreeCacheLocator], "home": [caching.UserWideCacheLocator]}
+caching.CacheImpl._locator_classes = places.get(sys.argv[1], [])
 import kernel
 assert kernel.twice(2) == 4 and kernel.twice(2.5) == 5.0
 print(sum(kernel.twice.stats.cache_hits.values()))
 """
-"""Numba's own places but the one beside the source are taken away; root can write everywhere."""
+"""Numba's own places but one are taken away; root can write everywhere."""
 
 
 @pytest.fixture
 def kernel(tmp_path):
-    """Calls a kernel in a process without a home; returns cache hits and what was said."""
+    """Calls a kernel in a process, by itself without a home; returns hits and what was said."""
     source = tmp_path / "source"
     source.mkdir()
     (source / "kernel.py").write_text(KERNEL)
 
-    def call(place: str, temporary: Path) -> tuple[int, str]:
+    def call(place: str, temporary: Path, **more: str) -> tuple[int, str]:
         removed = (kernel_cache._CLASSES, kernel_cache._DIRECTORY)
         kept = {name: value for name, value in os.environ.items() if name not in removed}
         path = os.pathsep.join([str(source), *filter(None, [os.environ.get("PYTHONPATH")])])
         variables = {"XDG_CACHE_HOME": "/dev/null", "TMPDIR": str(temporary), "PYTHONPATH": path}
-        done = python("-c", SCRIPT, place, env={**kept, **variables})
+        done = python("-c", SCRIPT, place, env={**kept, **variables, **more})
         assert done.returncode == 0, done.stderr
         return int(done.stdout), done.stderr
 
@@ -62,6 +63,35 @@ def test_kernels_are_kept_in_a_private_folder_where_no_other_can_be_written(kern
 def test_kernels_that_were_compiled_beside_the_source_are_taken_over(kernel, tmp_path):
     assert kernel("beside", tmp_path) == (0, "")
     assert kernel("nowhere", tmp_path)[0] == 2
+
+
+def test_a_user_who_cannot_write_beside_the_source_begins_with_the_kernels_there(kernel, tmp_path):
+    home = {"XDG_CACHE_HOME": str(tmp_path / "home")}
+    assert kernel("beside", tmp_path) == (0, "")
+    assert kernel("home", tmp_path, **home) == (2, "")
+    assert list((tmp_path / "home" / "numba").rglob("*.nbc"))
+
+
+def test_kernels_of_two_kinds_of_processors_are_kept_side_by_side(kernel, tmp_path):
+    processors = [{"NUMBA_CPU_NAME": name} for name in ("generic", "nehalem")]
+    assert [kernel("beside", tmp_path, **each)[0] for each in processors] == [0, 0]
+    assert [kernel("beside", tmp_path, **each)[0] for each in processors] == [2, 2]
+
+
+def test_two_that_compile_at_once_never_get_the_code_of_the_other(tmp_path):
+    """The second one writes between the index of the first and its code."""
+    first, second, later = (caching.IndexDataCacheFile(tmp_path, "kernel", 1) for _ in range(3))
+    write = first._save_data
+
+    def write_late(*words):
+        second._load_index = dict  # it looked before the first one wrote
+        second.save("znver3", "code with AVX2")
+        write(*words)
+
+    first._save_data = write_late
+    first.save("znver4", "code with AVX-512")
+    assert later.load("znver3") == "code with AVX2"
+    assert later.load("znver4") in (None, "code with AVX-512")
 
 
 def test_kernels_are_compiled_every_time_where_nothing_can_be_written(kernel, tmp_path):

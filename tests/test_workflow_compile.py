@@ -30,9 +30,19 @@ def test_a_group_is_compiled_once_and_again_when_a_source_changes(commands, monk
     assert main(["compile", "spectra"]) == 0 and len(commands) == len(command.GROUPS["spectra"])
     assert main(["compile"]) == 0
     assert len(commands) == sum(map(len, command.GROUPS.values()))
-    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    monkeypatch.setattr(command, "sources", lambda: "others")
     assert main(["compile", "spectra"]) == 0
     assert len(commands) == sum(map(len, command.GROUPS.values())) + len(command.GROUPS["spectra"])
+
+
+def test_a_group_is_compiled_once_for_each_kind_of_processor(commands, monkeypatch):
+    for compiles in (len(command.GROUPS["spectra"]), 0):
+        for name, features in (("generic", ""), ("znver4", "+avx2"), ("znver4", "+avx512f")):
+            commands.clear()
+            monkeypatch.setenv("NUMBA_CPU_NAME", name)
+            monkeypatch.setenv("NUMBA_CPU_FEATURES", features)
+            assert main(["compile", "spectra"]) == 0
+            assert len(commands) == compiles
 
 
 def test_unknown_groups_are_refused(commands, capsys):

@@ -3,20 +3,28 @@
 Numba keeps them in the folder that NUMBA_CACHE_DIR names, beside the source, or in the user's cache
 (`~/.cache/numba`), and refuses to work where none of these can be written: in a checkout of another
 user's, or a container, without a home. Then they go into a private folder for temporary files, and
-where there is none either, they are compiled every time.
+where there is none either, they are compiled every time. A folder elsewhere begins with a copy of
+the kernels beside the source.
+
+Kernels for several kinds of processors are in one folder. Numba's index tells them apart, but numba
+numbers the files of code: two processes that compile at once may take one number, and the next run
+may load code for another processor. Here the name of a file tells its content.
 """
 
+import hashlib
 import logging
 import os
 import shutil
 import stat
+import sys
 import tempfile
-from collections.abc import MutableMapping
-from contextlib import suppress
+from collections.abc import Iterator, MutableMapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from carillon.files.paths import is_own
+from carillon.processes.loading import while_loading
 
 logger = logging.getLogger(__name__)
 
@@ -25,6 +33,7 @@ FOLDER = "carillon-cache"
 PLACES = ("/tmp", "/var/tmp", "/dev/shm")
 """Folders besides TMPDIR that may hold compiled kernels."""
 
+_CACHING = "numba.core.caching"
 _CLASSES = "NUMBA_CACHE_LOCATOR_CLASSES"
 _DIRECTORY = "NUMBA_CACHE_DIR"
 _RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
@@ -37,6 +46,7 @@ def configure(environment: MutableMapping[str, str]) -> None:
 
     Others, such as Snakemake, which ends without a cache, get the private folder for theirs.
     """
+    while_loading(_CACHING, _mended)
     cache = environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     if _can_be_made(os.path.join(cache, "numba")):
         return
@@ -71,8 +81,6 @@ class Locator:
             _say(f"compiled kernels are kept in {cls.folder}, as the user's cache is not writable")
             config.CACHE_DIR = os.environ[_DIRECTORY] = str(cls.folder)
         place = caching.UserProvidedCacheLocator(function, source)
-        with suppress(OSError):
-            _take_over(Path(source).parent / "__pycache__", Path(place.get_cache_path()))
         place.ensure_cache_path()
         return place
 
@@ -105,6 +113,36 @@ def _kept_nowhere(function: Any, source: str) -> Any:
     return caching.InTreeCacheLocator(function, source)
 
 
+@contextmanager
+def _mended() -> Iterator[None]:
+    """Change where and by what names numba keeps kernels, as soon as its module is loaded."""
+    yield
+    caching: Any = sys.modules.get(_CACHING)
+    if caching is None:  # it is about to be
+        return
+    caching.IndexDataCacheFile.save = _save
+    for elsewhere in (caching.UserProvidedCacheLocator, caching.UserWideCacheLocator):
+        elsewhere.ensure_cache_path = _ensure_copy
+
+
+def _save(self: Any, key: Any, compiled: Any) -> None:
+    """Keep a kernel in a file whose name tells its source, types and processor."""
+    index = self._load_index()
+    if key not in index:
+        content = hashlib.sha256(repr((self._source_stamp, key)).encode()).hexdigest()[:16]
+        index[key] = f"{self._index_name.removesuffix('.nbi')}.{content}.nbc"
+        self._save_index(index)
+    self._save_data(index[key], compiled)
+
+
+def _ensure_copy(self: Any) -> None:
+    """Make a folder for kernels elsewhere, with those that are beside the source."""
+    caching, _ = _numba()
+    with suppress(OSError):
+        _take_over(Path(self._py_file).parent / "__pycache__", Path(self.get_cache_path()))
+    caching._CacheLocator.ensure_cache_path(self)
+
+
 def _numba() -> tuple[Any, Any]:
     from numba.core import caching, config
 
@@ -119,6 +157,7 @@ def _take_over(old: Path, new: Path) -> None:
     """Copy kernels that were compiled beside the source, as numba knows them again by its hash."""
     if new.is_dir() or not old.is_dir():
         return
+    new.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=new.parent) as folder:
         for each in _files(old):
             shutil.copyfile(each, Path(folder) / each.name)

@@ -1,10 +1,11 @@
 """Compile the kernels once, side by side, so that jobs that start together need not each do it.
 
-They are kept beside the source, or where NUMBA_CACHE_DIR says, for the processor that this runs on.
-A second call does nothing, unless a source or the processor has changed since.
+They are kept beside the source, or where NUMBA_CACHE_DIR says, for the processor that this runs on
+and beside those for others. A second call does nothing, unless a source has changed since.
 """
 
 import argparse
+import hashlib
 import json
 import os
 import subprocess
@@ -13,6 +14,8 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+
+from llvmlite import binding
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError
@@ -28,7 +31,7 @@ EXAMPLES = """examples:
 
 PACKAGES = ("carillon", "dataset_gen", "forests", "solver")
 DONE = Path(__file__).parent / "__pycache__"
-"""File that records what was compiled."""
+"""Folder of records of what was compiled, one for each group and kind of processor."""
 
 GROUPS = {
     "training": (
@@ -72,7 +75,7 @@ def run(arguments: argparse.Namespace) -> None:
     for name in groups:
         with suppress(OSError, UserError):
             DONE.mkdir(exist_ok=True)
-            with atomic_path(DONE / f"{name}.json") as temporary:
+            with atomic_path(_record(name)) as temporary:
                 temporary.write_text(requested)
 
 
@@ -97,13 +100,24 @@ def _compile(group: str) -> None:
 def compiled(group: str, wanted: str) -> bool:
     """Whether a group was compiled from these sources, see `sources`."""
     try:
-        return (DONE / f"{group}.json").read_text() == wanted
+        return _record(group).read_text() == wanted
     except OSError:
         return False
 
 
+def _record(group: str) -> Path:
+    kind = hashlib.sha256(json.dumps(_kind()).encode()).hexdigest()[:8]
+    return DONE / f"{group}-{kind}.json"
+
+
+def _kind() -> list[str | None]:
+    """The processor that is compiled for, and the folder of kernels."""
+    features = os.environ.get("NUMBA_CPU_FEATURES", binding.get_host_cpu_features().flatten())
+    return [compiled_for(), features, os.environ.get("NUMBA_CACHE_DIR")]
+
+
 def sources() -> str:
-    """The processor, and every source with its time and size, as compiled kernels are kept by."""
+    """The kind of processor, and every source with its time and size, by which kernels are kept."""
     files = sorted(
         path
         for folder in map(Path, rooms.folders())
@@ -111,4 +125,4 @@ def sources() -> str:
         for path in (folder / each).rglob("*.py")
     )
     stamps = [[str(path), path.stat().st_mtime_ns, path.stat().st_size] for path in files]
-    return json.dumps([compiled_for(), os.environ.get("NUMBA_CACHE_DIR"), stamps])
+    return json.dumps([_kind(), stamps])

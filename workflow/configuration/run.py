@@ -86,8 +86,8 @@ class SolverSection:
     ranks: Ranks = option(1, "MPI ranks of every solver run; cores are shared out among them [1]")
     launcher: CommandLine | None = option(
         None,
-        "command that starts the ranks; if null, srun --mpi=pmix in a job of SLURM and mpiexec "
-        "elsewhere",
+        "command that starts the ranks; if null, srun --mpi=pmix in a job of SLURM that has srun "
+        "and mpiexec elsewhere",
     )
     cores: Annotated[int, Ge(1), Le(65_536)] | None = option(
         None,

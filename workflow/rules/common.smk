@@ -1,6 +1,7 @@
 # Names, folders and helper functions that the other rules share.
 import os
 import shlex
+import shutil
 import sys
 from pathlib import Path
 
@@ -20,8 +21,9 @@ SOLVER_CORES = config["solver"]["cores"] or ALL_CORES
 RANKS = config["solver"]["ranks"]
 # Runs whose result is a spectrum go side by side: threads within one leave more of a core idle.
 RUN_CORES = config["solver"]["cores"] or min(ALL_CORES, max(RANKS, ALL_CORES // 4))
-# What starts ranks, in a job of SLURM its own.
-ANY_LAUNCHER = "srun --mpi=pmix" if "SLURM_JOB_ID" in os.environ else "mpiexec"
+# What starts ranks, in a job of SLURM its own, which an image for containers does not have.
+IN_SLURM = "SLURM_JOB_ID" in os.environ and shutil.which("srun")
+ANY_LAUNCHER = "srun --mpi=pmix" if IN_SLURM else "mpiexec"
 LAUNCHER = config["solver"]["launcher"] or ANY_LAUNCHER
 # The executor hides from what starts ranks how many cores they have and on which nodes they are: srun
 # would bind each to one core, and mpiexec fail.
