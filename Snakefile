@@ -7,7 +7,8 @@ from snakemake.utils import min_version
 from carillon.errors import UserError
 from carillon.command_line.progress import say
 import studies
-from workflow import disk_space, patient_slurm, pinned_meshes, settings, slurm_cleanup, submission
+from workflow import disk_space, patient_slurm, pinned_meshes, settings, slurm_cleanup
+from workflow import slurm_watch, submission
 from workflow.estimate import used
 
 min_version("9.0")
@@ -52,10 +53,16 @@ for rules_of_study in rules_of_studies:
 include: f"{studies.FOLDER}/base/rules.smk"
 
 
+# What happens to the jobs of SLURM, in a run on a cluster.
+WATCH = []
+
+
 onstart:
     if not workflow.local_exec:
         if shutil.which("sbatch"):
             prepend("PATH", patient_slurm.install())
+            WATCH.append(slurm_watch.Watch(patient_slurm.FOLDER))
+            WATCH[0].start()
         places = [workflow.main_snakefile, Path.cwd(), *workflow.overwrite_configfiles]
         try:
             submission.require_plain(places, workflow.config_settings.config)
@@ -69,10 +76,14 @@ onstart:
 
 
 onsuccess:
+    for watch in WATCH:
+        watch.tell()
     used.tell(workflow, config, RESULTS)
 
 
 onerror:
+    for watch in WATCH:
+        watch.tell()
     disk_space.check_disk(RESULTS)
     used.tell(workflow, config, RESULTS)
 

@@ -1,7 +1,10 @@
 """A SLURM that does not answer, answers late or forgets: its jobs are neither lost nor doubled."""
 
+import base64
+import json
 import os
 import subprocess
+import zlib
 from pathlib import Path
 
 import pytest
@@ -90,6 +93,23 @@ def test_jobs_keep_the_comment_that_tells_a_killed_runs_jobs(slurm):
     run(SUBMIT)
     comment = (folder / "1.comment").read_text()
     assert comment.startswith("rule_a ") and slurm_cleanup._RUN.fullmatch(RUN)
+
+
+@pytest.mark.parametrize("by_script", [False, True])
+def test_each_task_of_an_array_has_a_command_of_its_own(by_script):
+    """Snakemake's executor gives each the first one's, which waits for the first one's files."""
+    packed = {number: zlib.compress(f"echo {number}".encode()).hex() for number in "34"}
+    payload = base64.b64encode(json.dumps(packed).encode()).decode()
+    command = f"echo 2 {patient_slurm.TASK_COMMANDS}"
+    if by_script:
+        words, script = ["--array=2-4", "/dev/stdin"], f"#!/bin/sh\n{command}\n{payload}"
+    else:
+        words, script = ["--array=2-4", f"--wrap={command}={payload}"], None
+    words, script = patient_slurm._with_own_commands(words, script)
+    assert words == ["--array=2-4", "/dev/stdin"]
+    for task in "234":
+        done = run("sh", "-c", script, env={"SLURM_ARRAY_TASK_ID": task})
+        assert done.stdout == f"{task}\n"
 
 
 @pytest.mark.nightly

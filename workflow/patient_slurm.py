@@ -6,13 +6,16 @@ minutes after the end (`MinJobAge`); and it asks `sacct` when the controller is 
 there is no accounting. The commands of this module stand before SLURM's own in the search path of a
 run:
 
-`sbatch` submits again when there was no answer, unless a job that bears its mark is in the queue;
+`sbatch` submits again when there was no answer, unless a job that bears its mark is in the queue,
+and gives each task of an array its own command;
 `squeue` tells of a job that was submitted and is no longer known that its state is `UNKNOWN`,
 whereupon Snakemake looks for its files; `sacct` answers by `squeue` where it cannot itself.
 
 It runs as a program of its own, with nothing but the standard library.
 """
 
+import base64
+import json
 import os
 import re
 import shlex
@@ -22,7 +25,9 @@ import subprocess
 import sys
 import time
 import uuid
+import zlib
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 FOLDER = Path(".snakemake", "slurm-commands")
@@ -46,8 +51,14 @@ NO_ANSWER = re.compile(
     re.IGNORECASE,
 )
 """Words of `sbatch` when it does not know whether the job was accepted; else it was refused."""
+TASK_COMMANDS = "--slurm-jobstep-array-execs"
+"""Option of a task's Snakemake that holds the commands of all other tasks."""
 STATES = "--format=%i|%T"
 """Options by which Snakemake asks `squeue` for number and state of each job."""
+FATES = "--format=%i|%T|%N|%r"
+"""The same, with the nodes and the reason of the state, for `workflow.slurm_watch`."""
+FATES_ENDING = "fates"
+"""Ending of the file that keeps what `squeue` has last answered."""
 UNKNOWN = "UNKNOWN"
 """State on which Snakemake decides by the files of a job."""
 
@@ -107,6 +118,7 @@ class Slurm:
         words, script = _marked(arguments, mark), None
         if words and words[-1] == "/dev/stdin":
             script = sys.stdin.read()
+        words, script = _with_own_commands(words, script)
         until = time.monotonic() + PATIENCE_SECONDS
         while True:
             done = self._run("sbatch", words, script, timeout=None)
@@ -127,7 +139,9 @@ class Slurm:
 
     def tell_states(self, arguments: Sequence[str]) -> int:
         """Tell the states of a run's jobs, also of those that SLURM has forgotten."""
-        noted = self._noted(arguments[arguments.index("--name") + 1])
+        name = arguments[arguments.index("--name") + 1]
+        noted = self._noted(name)
+        arguments = [FATES if word == STATES else word for word in arguments]
         done = self._run("squeue", arguments)
         if done.returncode == 0 and noted - _known(done.stdout):
             # Asked again, for fear of a controller that has only just begun.
@@ -135,12 +149,21 @@ class Slurm:
             done = self._run("squeue", arguments)
         sys.stderr.write(done.stderr)
         if done.returncode == 0:
-            sys.stdout.write(done.stdout)
+            self._keep_fates(name, done.stdout)
+            for line in done.stdout.splitlines():
+                print(*line.split("|")[:2], sep="|")
             for number in sorted(noted - _known(done.stdout)):
                 state = self._remembered(number)
                 self._say(f"squeue: job {number} is no longer known, its state is {state}")
                 print(f"{number}|{state}")
         return done.returncode
+
+    def _keep_fates(self, name: str, answer: str) -> None:
+        """Keep what `squeue` has answered; on a folder that is full the run goes on without."""
+        part = self._folder / f"{name}.{os.getpid()}"
+        with suppress(OSError):
+            part.write_text(answer)
+            part.replace(self._folder / f"{name}.{FATES_ENDING}")
 
     def account(self, arguments: Sequence[str]) -> int:
         """Ask the accounting, or else the queue for what Snakemake wants to know."""
@@ -222,6 +245,31 @@ def _marked(arguments: Sequence[str], mark: str) -> list[str]:
     place = words.index("--comment") + 1
     words[place] = f"{words[place]} {mark}"
     return words
+
+
+def _with_own_commands(words: list[str], script: str | None) -> tuple[list[str], str | None]:
+    """Arguments and script of `sbatch`, those of an array as a script with a command for each task.
+
+    Snakemake's executor gives every task the command of the first one, which starts the task's own
+    and then looks for the files of the first: a task that ends long before the first one fails, and
+    its finished files are removed.
+    """
+    whole = script if script is not None else next(filter(_is_wrapped, words), "")
+    first, found, rest = whole.partition(TASK_COMMANDS)
+    if not found:
+        return words, script
+    (payload,) = shlex.split(rest.lstrip("= "))
+    packed = json.loads(base64.b64decode(payload))
+    commands = {number: zlib.decompress(bytes.fromhex(text)) for number, text in packed.items()}
+    first = first.removeprefix("--wrap=").removeprefix("#!/bin/sh").strip()
+    cases = [f"{number}) {command.decode()} ;;" for number, command in commands.items()]
+    lines = ["#!/bin/sh", "case $SLURM_ARRAY_TASK_ID in", *cases, f"*) {first} ;;", "esac", ""]
+    kept = [word for word in words if not _is_wrapped(word) and word != "/dev/stdin"]
+    return [*kept, "/dev/stdin"], "\n".join(lines)
+
+
+def _is_wrapped(word: str) -> bool:
+    return word.startswith("--wrap=")
 
 
 def _value(words: Sequence[str], option: str) -> str | None:
