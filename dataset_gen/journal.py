@@ -26,6 +26,7 @@ from carillon.errors import UserError, one_line
 from carillon.files.atomic import sync_folder
 from carillon.files.locks import is_at, is_exclusive, is_replaced, machine, take, take_over
 from carillon.files.paths import cause
+from carillon.processes.slurm_job import is_restarted
 from dataset_gen.settings import settings_from
 from dataset_gen.tasks import ShardPlan
 
@@ -55,8 +56,9 @@ def discard_journal(path: Path) -> None:
 class Journal:
     """The journal beside the shard `path`, locked and ready to be continued.
 
-    Raises UserError if another process works on the shard, or the journal cannot be written, is
-    damaged at its beginning, or belongs to other settings.
+    A job that SLURM has started again waits for another process that works on the shard. Raises
+    UserError if another process works on the shard, or the journal cannot be written, is damaged at
+    its beginning, or belongs to other settings.
 
     Attributes
     ----------
@@ -74,7 +76,8 @@ class Journal:
         self._shard = path
         self._synced = time.monotonic()
         self._owner: dict[str, Any] = {}
-        self._file = _locked(self.path)
+        # A node that was cut off may still run this very job.
+        self._file = _locked(self.path, patient=is_restarted())
         try:
             self._end = self._read()
             self._own()
@@ -277,9 +280,10 @@ def _read(file: int, length: int, position: int) -> bytes:
     return b"".join(pieces)
 
 
-def _locked(journal: Path) -> int:
+def _locked(journal: Path, patient: bool = False) -> int:
     return take(
         journal,
         f"{journal}: {_owner_at(journal)} is generating this shard; wait for it, or choose another "
         "name",
+        patient,
     )

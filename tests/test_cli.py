@@ -126,6 +126,14 @@ def test_errors_are_one_sentence_and_a_status(main, status, said, capsys):
     assert line.startswith(f"program: {said}")
 
 
+def test_in_a_job_of_slurm_errors_name_the_job_and_the_node(capsys, monkeypatch):
+    for name, value in {"JOB_ID": "9", "ARRAY_JOB_ID": "7", "ARRAY_TASK_ID": "2"}.items():
+        monkeypatch.setenv(f"SLURM_{name}", value)
+    monkeypatch.setenv("SLURMD_NODENAME", "n3")
+    assert exit_status.run("program", raising(UserError("bad"))) == 2
+    assert capsys.readouterr().err == "program (in job 7_2 on n3): bad\n"
+
+
 def test_a_fault_of_the_program_keeps_its_traceback():
     with pytest.raises(ZeroDivisionError):
         exit_status.run("program", raising(ZeroDivisionError()))

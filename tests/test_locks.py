@@ -18,6 +18,13 @@ with locked(sys.argv[1]):
     sys.stdin.read()
 """
 
+PATIENT = """
+import sys
+from pathlib import Path
+from carillon.files.locks import take
+take(Path(sys.argv[1]), "", patient=True)
+"""
+
 
 @pytest.fixture
 def holder(tmp_path):
@@ -48,6 +55,20 @@ def test_the_second_is_refused_in_one_sentence(holder, tmp_path):
 def test_a_lock_is_gone_when_its_holder_has_finished(holder, tmp_path):
     holder.communicate("")
     assert holder.returncode == 0 and list(tmp_path.iterdir()) == []
+
+
+def test_the_patient_wait_until_the_holder_has_ended(holder, tmp_path):
+    waiting = subprocess.Popen(
+        [sys.executable, "-c", PATIENT, str(tmp_path / ".design.h5.lock")],
+        cwd=CHECKOUT,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert "is held by another process; waiting" in waiting.stderr.readline()
+    assert waiting.poll() is None
+    holder.kill()
+    assert waiting.wait() == 0
+    waiting.stderr.close()
 
 
 def test_the_lock_of_a_killed_holder_is_taken_over_and_removed(holder, tmp_path):

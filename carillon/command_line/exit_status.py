@@ -13,6 +13,7 @@ from carillon.command_line import logs
 from carillon.command_line.progress import say
 from carillon.errors import ConvergenceError, UserError, one_line
 from carillon.files.paths import cause
+from carillon.processes.slurm_job import job_and_node
 
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
@@ -30,6 +31,7 @@ Comm = Any
 def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
     """Call `main` and turn errors meant for the user into a sentence and an exit status.
 
+    In a job of SLURM the sentence names the job and the node.
     That is 0; 2 for bad input, or lack of memory or room; 3 if a solver missed its tolerance; 130
     for an interrupt from the keyboard.
 
@@ -62,7 +64,9 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
             traceback.print_exc()
         collective = getattr(error, "collective", False)
         if sentence is not None and (comm is None or comm.rank == 0 or not collective):
-            said = "\n".join(f"{program}: {line}" for line in sentence.split("\n"))
+            where = job_and_node()
+            begin = f"{program} (in {where})" if where else program
+            said = "\n".join(f"{begin}: {line}" for line in sentence.split("\n"))
             say(said)
             report(said)
     _drop_unwritten()

@@ -44,12 +44,12 @@ def locked(path: str | Path) -> Iterator[None]:
         os.close(file)
 
 
-def take(name: Path, refusal: str) -> int:
+def take(name: Path, refusal: str, patient: bool = False) -> int:
     """Open the file `name`, made if need be, for this process alone; closing it gives it back.
 
-    Who removes the file must do so before closing it. Raises UserError with the sentence `refusal`
-    if another process has it; if it cannot be opened or is no regular file, but a link, pipe or
-    device.
+    Who removes the file must do so before closing it. If another process has it, the `patient` wait
+    until that has ended. Raises UserError with the sentence `refusal` if another process has it; if
+    it cannot be opened or is no regular file, but a link, pipe or device.
     """
     flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
     while True:
@@ -62,7 +62,7 @@ def take(name: Path, refusal: str) -> int:
         try:
             if not stat.S_ISREG(os.fstat(file).st_mode):
                 raise UserError(f"{name}: is no regular file, remove it")
-            _lock(name, file, refusal)
+            _lock(name, file, refusal, patient)
             if is_at(name, file):
                 return file
         except BaseException:
@@ -71,11 +71,14 @@ def take(name: Path, refusal: str) -> int:
         os.close(file)  # who had it before has finished and removed it
 
 
-def _lock(name: Path, file: int, refusal: str) -> None:
+def _lock(name: Path, file: int, refusal: str, patient: bool) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise UserError(refusal) from None
+        if not patient:
+            raise UserError(refusal) from None
+        logger.warning(f"{name}: is held by another process; waiting until that has ended")
+        fcntl.flock(file, fcntl.LOCK_EX)
     except OSError as error:
         if error.errno not in _NO_LOCKS:
             raise UserError(f"{name}: cannot be locked ({cause(error)})") from None
