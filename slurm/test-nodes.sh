@@ -95,8 +95,8 @@ be_node() {
     own /var/tmp "$FOLDER/shared"
     own /dev/shm /dev/null
     hostname "$1"
-    # Sockets of jobs that died with the node: the next job of that number would find them in use.
-    rm -f "$FOLDER/spool-$1"/stepd.slurm.pmix.*
+    # What PMIx has left of jobs that died with the node: ranks of a job that starts again would find it.
+    rm -rf "$FOLDER/spool-$1"/{stepd.slurm.pmix,pmix}.*
     echo "$process $network" >"$FOLDER/$1.init"
     slurmd -N "$1"
     while :; do

@@ -57,10 +57,17 @@ class Cluster:
     def repair(self, *node: str) -> None:
         """Bring the node back, and start what it lost soon; SLURM would wait two minutes."""
         control("repair", self.folder, *node)
-        if not node:
-            # Until the node has been told that the jobs are dead, it would kill them again.
-            time.sleep(5)
+        # Until the node has been told that the jobs are dead, it would kill them again.
+        time.sleep(5)
         self.start_waiting_jobs()
+
+    def unplug(self, node: str) -> None:
+        """Cut a node off from the others."""
+        control("unplug", self.folder, node)
+
+    def plug(self, node: str) -> None:
+        """Connect it again."""
+        control("plug", self.folder, node)
 
     def start_waiting_jobs(self) -> None:
         """Start jobs now that were put back into the queue."""
@@ -71,6 +78,11 @@ class Cluster:
     def on(self, node: str, *words: object, **options: Any) -> subprocess.CompletedProcess[str]:
         """Run a program on a node, in the same folder; options are those of `run`."""
         return run("bash", SCRIPT, "on", self.folder, node, *words, **options)
+
+    def files_of(self, node: str) -> Path:
+        """The root folder of a node, as this process sees it."""
+        process, _ = (self.folder / f"{node}.init").read_text().split()
+        return Path("/proc", process, "root")
 
     def restart_controller(self, pause: float) -> None:
         """Leave the cluster without slurmctld for some seconds."""
@@ -149,10 +161,14 @@ def running(folder: Path, together: Path, *options: object, **variables: str) ->
             control("stop", folder)
 
 
-def batch(
-    folder: Path, *words: object, options: Sequence[object] = ()
-) -> subprocess.CompletedProcess[str]:
-    """Run one of the job scripts, or another command, by `sbatch --wait` in a folder.
+def submit(
+    folder: Path,
+    *words: object,
+    options: Sequence[object] = (),
+    before: Sequence[object] = (),
+    **variables: str,
+) -> subprocess.Popen[str]:
+    """Start one of the job scripts, or another command, by `sbatch --wait` in a folder.
 
     Parameters
     ----------
@@ -160,28 +176,51 @@ def batch(
         The script and its arguments.
     options
         Of `sbatch`.
+    before
+        A command that runs `sbatch`, in place of this process.
+    variables
+        Of the environment of the jobs.
 
     Returns
     -------
-    The process; what the jobs have printed stands in the files `slurm-*.out`.
+    A process that ends with the jobs; what they print stands in the files `slurm-*.out`.
     """
-    environment = checkout_environment(PYTHON=sys.executable, **PATIENT_RANKS)
-    return run("sbatch", "--wait", *options, *words, cwd=folder, env=environment)
+    environment = checkout_environment(PYTHON=sys.executable, **PATIENT_RANKS) | variables
+    return subprocess.Popen(
+        [
+            str(word)
+            for word in (*before, "sbatch", "--wait", f"--chdir={folder}", *options, *words)
+        ],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def batch(folder: Path, *words: object, options: Sequence[object] = ()) -> None:
+    """Run what `submit` starts to a good end."""
+    process = submit(folder, *words, options=options)
+    said, _ = process.communicate(timeout=HANG_SECONDS)
+    assert process.returncode == 0, said + logs(folder)
 
 
 def logs(folder: Path) -> str:
-    """What the jobs of `batch` have printed."""
+    """What the jobs that were submitted in a folder have printed."""
     return "".join(path.read_text() for path in sorted(folder.glob("slurm-*.out")))
 
 
-def snakemake(folder: Path, *options: object) -> subprocess.Popen[str]:
-    """Start Snakemake with the SLURM profile; its output goes to FOLDER/snakemake.log."""
+def snakemake(folder: Path, *options: object, **variables: str) -> subprocess.Popen[str]:
+    """Start Snakemake with the SLURM profile; its output goes to FOLDER/snakemake.log.
+
+    `variables`: more of the environment.
+    """
     command = [sys.executable, "-m", "snakemake", "-s", CHECKOUT / "Snakefile"]
     with (folder / "snakemake.log").open("w") as log:
         return subprocess.Popen(
             [str(part) for part in (*command, "--profile", PROFILE, *QUICK, *options)],
             cwd=folder,
-            env=checkout_environment(**PATIENT_RANKS),
+            env=checkout_environment(**PATIENT_RANKS, **variables),
             stdout=log,
             stderr=subprocess.STDOUT,
             text=True,

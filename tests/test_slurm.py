@@ -92,12 +92,11 @@ def test_jobs_were_an_array_and_mpi_jobs(remote):
 @pytest.mark.system
 def test_array_by_hand_yields_identical_shards(cluster, remote, tmp_path):
     arguments = f"--samples {SAMPLES} --shards {SHARDS} --seed 0 --distribution uniform"
-    done = slurm_cluster.batch(
+    slurm_cluster.batch(
         tmp_path,
         *(CHECKOUT / "slurm" / "shards.sbatch", "uniform-%a.h5", *arguments.split()),
         options=[f"--array=0-{SHARDS - 1}", "--ntasks=2", "--mem-per-cpu=500M"],
     )
-    assert done.returncode == 0, done.stderr + slurm_cluster.logs(tmp_path)
     for file in DATASET:
         assert digest(tmp_path / Path(file).name) == digest(remote / file)
 

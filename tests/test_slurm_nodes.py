@@ -55,12 +55,6 @@ def run_here(folder: Path, module: str, *words: object) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def run_there(folder: Path, *words: object, options: list[str]) -> None:
-    """Run jobs on the cluster to a good end."""
-    done = slurm_cluster.batch(folder, *words, options=options)
-    assert done.returncode == 0, done.stderr + slurm_cluster.logs(folder)
-
-
 @pytest.fixture(scope="module")
 def here(tmp_path_factory):
     """Folder with the shards and the forests that one process makes."""
@@ -93,7 +87,7 @@ def test_ranks_of_three_nodes_share_no_memory(cluster, tmp_path):
         "ranks.rank or print(found)"
     )
     (tmp_path / "ranks.py").write_text(program)
-    run_there(
+    slurm_cluster.batch(
         tmp_path,
         f"--wrap=srun --mpi=pmix {sys.executable} -m mpi4py ranks.py",
         options=ONE_RANK_EACH,
@@ -103,7 +97,7 @@ def test_ranks_of_three_nodes_share_no_memory(cluster, tmp_path):
 
 def test_shards_of_an_array_are_those_of_one_process(cluster, here, tmp_path):
     before = len(cluster.ended())
-    run_there(
+    slurm_cluster.batch(
         tmp_path,
         *(CHECKOUT / "slurm" / "shards.sbatch", "%a.h5", *SHARD),
         options=[f"--array=0-{RANKS - 1}", *WHOLE_NODES],
@@ -119,12 +113,12 @@ def test_trees_of_an_array_and_leaves_of_ranks_are_the_forests_of_one_process(
     shards = [here / f"{shard}.h5" for shard in range(RANKS)]
     script, trees = CHECKOUT / "slurm" / "forests.sbatch", range(2)
     before = len(cluster.ended())
-    run_there(
+    slurm_cluster.batch(
         tmp_path,
         *(script, "grow", "tree-%a.h5", *shards, *FORESTS),
         options=["--array=0-1", *WHOLE_NODES],
     )
-    run_there(
+    slurm_cluster.batch(
         tmp_path,
         *(script, "train", "forests.h5", *shards, *FORESTS),
         *("--structure", *(f"tree-{tree}.h5" for tree in trees)),
