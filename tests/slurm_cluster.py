@@ -57,8 +57,6 @@ class Cluster:
     def repair(self, *node: str) -> None:
         """Bring the node back, and start what it lost soon; SLURM would wait two minutes."""
         control("repair", self.folder, *node)
-        # Until the node has been told that the jobs are dead, it would kill them again.
-        time.sleep(5)
         self.start_waiting_jobs()
 
     def unplug(self, node: str) -> None:
@@ -70,7 +68,9 @@ class Cluster:
         control("plug", self.folder, node)
 
     def start_waiting_jobs(self) -> None:
-        """Start jobs now that were put back into the queue."""
+        """Start jobs soon that were put back into the queue."""
+        # A node that has just killed them, or has yet to be told that they are dead, refuses them.
+        time.sleep(5)
         waiting = ["squeue", "--noheader", "--states=PENDING", "--format=%A"]
         for job in run(*waiting).stdout.split():
             subprocess.run(["scontrol", "update", f"JobId={job}", "StartTime=now"], check=True)
