@@ -166,8 +166,8 @@ def test_bytes_that_a_cut_off_machine_writes_late_spoil_nothing(path, locking, m
 def test_of_two_that_begin_at_once_one_goes_on(path, locking, monkeypatch):
     others = []
 
-    def take(name, refusal, take=journals.take):
-        file = take(name, refusal)
+    def take(name, refusal, patient=False, take=journals.take):
+        file = take(name, refusal, patient)
         if not others:
             others.append(None)
             others[:] = [Journal(path, PLAN, {})]

@@ -22,9 +22,9 @@ FORESTS = "--trees 1 --depth 6".split()
 SMALL = f"""\
 models: {{bar: {{mesh: 'builtin:bar', resolution: 12, material: two-region}}}}
 dataset: {{samples: {SAMPLES}, distributions: [uniform], shards: {RANKS}}}
-forests: {{trees: 1, depth: 6, ranks: {RANKS}}}
+forests: {{trees: 1, depth: 6, ranks: {RANKS}, threads: 2}}
 solver: {{modes: 16, ranks: {RANKS}, cores: {2 * RANKS}, launcher: LAUNCHER}}
-resources: {{train_forests: {{memory_mb: 2000}}, find_modes: {{memory_mb: 2000}}}}
+resources: {{find_modes: {{memory_mb: 2000}}}}
 """
 MODES = "results/models/bar/ddfem_hcms_ec.h5"
 UNCORRECTED = "results/models/bar/hcms.h5"
@@ -152,8 +152,8 @@ def remote(cluster, tmp_path_factory):
 
 def test_a_run_on_three_nodes_finds_the_same_bits_as_a_local_run(local, remote):
     folder, jobs = remote
-    # Two cores of each rank fill a node: training, and two runs of the solver.
-    assert [job["NodeList"] for job in jobs].count("n[1-3]") == 3
+    # Two cores of each rank fill a node: two trees, their leaves, and two runs of the solver.
+    assert [job["NodeList"] for job in jobs].count("n[1-3]") == 5
     for file in (*DATASET, MODEL, UNCORRECTED):
         assert digest(folder / file) == digest(local / file), file
 

@@ -28,7 +28,6 @@ models: {{bar: {{mesh: 'builtin:bar', resolution: 12}}}}
 dataset: {{samples: 300000, distributions: [uniform], shards: {COUNT}, objective: chen2015}}
 forests: {{trees: 1, depth: 6, ranks: {COUNT}, structure_rows: 16000}}
 solver: {{cores: {2 * COUNT}, launcher: LAUNCHER}}
-resources: {{train_forests: {{memory_mb: 2000}}}}
 """
 RUN_SHARDS = [f"results/dataset/uniform-{shard}.h5" for shard in range(COUNT)]
 RUN_FORESTS = "results/forests/forests.h5"
