@@ -45,7 +45,6 @@ rule train_forests:
         f"{LOGS}/forests/train.log",
     benchmark:
         f"{BENCHMARKS}/forests/train.tsv"
-    retries: 2
     threads: OWN.cores(SOLVER_CORES)
     resources:
         **leaves_limits("train_forests", OWN),
