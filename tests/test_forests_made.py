@@ -10,9 +10,9 @@ from forests.training import dataset, growing, leaf_fit
 from forests.training.dataset import dataset_of, made_dataset
 from forests.training.kept import Kept, folder_of
 from forests.training.made import SampleOptions, whole_number
-from forests.training.options import TrainingOptions
+from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
-from forests.training.train import parameters_of, train_trees, write_forests
+from forests.training.train import train_trees, write_forests
 from tests.small_forests import train
 from workflow.commands.digest import digest
 

@@ -15,11 +15,10 @@ from forests.training.growers import GROWERS
 from forests.training.growing import grow_trees
 from forests.training.leaves import ANCESTOR_ROWS, add_rows, leaf_of, solve_leaves
 from forests.training.moments import ENTRIES, fit_errors, solve
-from forests.training.options import TrainingOptions
+from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
 from forests.training.spent import Spent
 from forests.training.structure import Rows, TreeLimits, tree_of
-from forests.training.train import parameters_of
 from forests.training.tree_file import load_trees, save_tree
 from tests.shard_files import write_shard
 from tests.small_forests import train

@@ -15,10 +15,9 @@ from carillon.processes.ranks import world
 from forests.commands.training import add_training, add_workers, data_of
 from forests.training.dataset import Dataset
 from forests.training.growing import grow_trees
-from forests.training.options import TrainingOptions
+from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
 from forests.training.spent import Stopwatch, peak_memory
-from forests.training.train import parameters_of
 from forests.training.tree_file import save_tree
 
 EXAMPLES = """examples:

@@ -14,9 +14,9 @@ from carillon.parameters.quantities import Positive
 from carillon.processes.ranks import world
 from forests.commands.training import add_training, add_workers, data_of
 from forests.training.dataset import Dataset
-from forests.training.options import TrainingOptions
+from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
-from forests.training.train import Grown, parameters_of, write_forests
+from forests.training.train import Grown, write_forests
 from forests.training.tree_file import load_trees
 
 EXAMPLES = """examples:

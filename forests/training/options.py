@@ -1,11 +1,14 @@
-"""Parameters of a training."""
+"""Parameters of a training, and all that it depends on."""
 
-from typing import Annotated
+from dataclasses import asdict
+from itertools import groupby
+from typing import Annotated, Any
 
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import Count, Number, between
 from forests.layout import MOST_LEAVES
 from forests.scaling import TRANSFORMS
+from forests.training.dataset import Dataset
 from forests.training.growers import GROWERS
 from forests.training.structure import TreeLimits
 
@@ -44,3 +47,22 @@ class TrainingOptions:
     def kind(self, job: int) -> int:
         """Forest that a tree belongs to."""
         return job // self.trees
+
+
+def parameters_of(dataset: Dataset, training: TrainingOptions) -> dict[str, Any]:
+    """What a training depends on, for the provenance; not how the samples lie in shards."""
+    parts = [asdict(part) for part in dataset.settings]
+    names = ("objective", "poisson", "code", "seed", "distribution", "low", "high")
+    ranges: list[list[Any]] = []
+    for key, same in groupby(parts, key=lambda part: [part[name] for name in names]):
+        for part in same:
+            if ranges and ranges[-1][:-2] == key and ranges[-1][-1] == part["start"]:
+                ranges[-1][-1] = part["stop"]
+            else:
+                ranges.append([*key, part["start"], part["stop"]])
+    shared, own = len(("objective", "poisson", "code")), dict(zip(names, ranges[0]))
+    return {
+        **asdict(training),
+        **{name: own[name] for name in names[:shared]},
+        "samples": [each[shared:] for each in ranges],
+    }

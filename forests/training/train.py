@@ -1,7 +1,6 @@
 """Train both forests on fitted blocks and score them on blocks held out."""
 
-from dataclasses import asdict, replace
-from itertools import groupby
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from forests.training.growing import KINDS, grow_trees
 from forests.training.kept import Kept
 from forests.training.leaf_fit import KEEP_SECONDS, add_samples, sums_of
 from forests.training.leaves import Leaves, join, solve_leaves
-from forests.training.options import TrainingOptions
+from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
 from forests.training.scores import held_out_scores, uniform_scores
 from forests.training.spent import Spent, Stopwatch, peak_memory
@@ -154,22 +153,3 @@ def write_forests(
         save_model(out, model)
         kept.remove()
     return model
-
-
-def parameters_of(dataset: Dataset, training: TrainingOptions) -> dict[str, Any]:
-    """What a training depends on, for the provenance; not how the samples lie in shards."""
-    parts = [asdict(part) for part in dataset.settings]
-    names = ("objective", "poisson", "code", "seed", "distribution", "low", "high")
-    ranges: list[list[Any]] = []
-    for key, same in groupby(parts, key=lambda part: [part[name] for name in names]):
-        for part in same:
-            if ranges and ranges[-1][:-2] == key and ranges[-1][-1] == part["start"]:
-                ranges[-1][-1] = part["stop"]
-            else:
-                ranges.append([*key, part["start"], part["stop"]])
-    shared, own = len(("objective", "poisson", "code")), dict(zip(names, ranges[0]))
-    return {
-        **asdict(training),
-        **{name: own[name] for name in names[:shared]},
-        "samples": [each[shared:] for each in ranges],
-    }

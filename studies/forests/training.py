@@ -29,11 +29,11 @@ from forests.training.dataset import (
     rows_of,
 )
 from forests.training.leaves import answers_of
-from forests.training.options import TrainingOptions
+from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
 from forests.training.scores import scores_of
 from forests.training.structure import Tree
-from forests.training.train import Trained, parameters_of, train_trees, write_forests
+from forests.training.train import Trained, train_trees, write_forests
 from forests.training.tree_file import difference
 from studies.forests.config import VARIANTS
 
