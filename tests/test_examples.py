@@ -62,8 +62,7 @@ def test_an_example_runs_and_draws_its_picture(script, tmp_path):
 
 @pytest.mark.mpi
 @pytest.mark.nightly
-def test_ranks_say_the_same(tmp_path, mpiexec, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    done = mpiexec(2, gallery.EXAMPLES / "on_ranks.py", check=True)
+def test_ranks_say_the_same(tmp_path, mpiexec):
+    done = mpiexec(2, gallery.EXAMPLES / "on_ranks.py", cwd=tmp_path, check=True)
     said = {line.partition(": ")[2] for line in done.stdout.splitlines() if "rank " in line}
     assert len(said) == 1
