@@ -29,7 +29,8 @@ LOGARITHM_BITS = 18
 """Bits behind the binary point in the upper integer, where features and targets are logarithms of
 ratios. Each is below 18, so that 10^11 rows of the largest products stay below 2^63."""
 RATIO_BITS = -2
-"""The same where they are ratios, up to `MOST`."""
+"""Bits behind the binary point in the upper integer, where features and targets are ratios, which
+count as `MOST` at most."""
 MOST = 131072.0
 """Largest feature or target [1] that is summed; a larger ratio counts as this one."""
 AHEAD = 8
@@ -42,7 +43,7 @@ _MAGIC_BITS = int(np.array(_MAGIC).view(np.int64))
 
 @dataclass
 class Sums:
-    """What the rows seen so far mean for each leaf."""
+    """Sums of the moments of each leaf's rows, their number, and the range of their targets."""
 
     bits: int
     """Bits behind the binary point of the upper integers."""

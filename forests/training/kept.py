@@ -1,4 +1,4 @@
-"""What a training has worked out so far, beside the file that it will write.
+"""Trees and sums that an unfinished training keeps, in a folder beside the file that it will write.
 
 A training that was killed goes on from there: from the trees that were grown, and from the sums of
 the leaves over the samples that were added.
@@ -78,7 +78,7 @@ class Kept:
                     file[f"{job}/{name}"] = values
 
     def sums(self, nothing: LeafSums) -> LeafSums:
-        """What was kept of the leaves, written into sums over nothing; these if there is nothing.
+        """Sums that were kept, read into the arrays of `nothing`; `nothing` if there are none.
 
         Raises UserError if it is damaged or was worked out with other parameters.
         """

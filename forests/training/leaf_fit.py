@@ -37,7 +37,7 @@ COSTLY = 20.0
 
 @dataclass
 class LeafSums:
-    """What is known of the leaves after the first blocks of a dataset."""
+    """Sums of all trees' leaves over the first blocks of a dataset, and samples held out."""
 
     sums: dict[int, Sums]
     """By tree number."""

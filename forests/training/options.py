@@ -36,7 +36,7 @@ class TrainingOptions:
 
     @property
     def limits(self) -> TreeLimits:
-        """What a tree may grow to."""
+        """Limits of the growth of a tree."""
         return TreeLimits(self.max_leaves, self.min_leaf, self.depth)
 
     @property
@@ -50,7 +50,7 @@ class TrainingOptions:
 
 
 def parameters_of(dataset: Dataset, training: TrainingOptions) -> dict[str, Any]:
-    """What a training depends on, for the provenance; not how the samples lie in shards."""
+    """Options of a training and ranges of its samples, for its provenance, without the shards."""
     parts = [asdict(part) for part in dataset.settings]
     names = ("objective", "poisson", "code", "seed", "distribution", "low", "high")
     ranges: list[list[Any]] = []
