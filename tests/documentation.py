@@ -29,6 +29,7 @@ PROGRAMS = {
     ".venv/bin/carillon": [sys.executable, str(Path(sys.executable).with_name("carillon"))],
 }
 """Programs of the environment, and how the tests call them: as people do."""
+_PROGRAM = re.compile(rf"(?<!\S)({'|'.join(map(re.escape, PROGRAMS))})(?!\S)")
 
 _BLOCK = re.compile(
     r"(?P<spared><!-- not run: [^\n]+ -->\n)?^(?P<fence>`{3,})(?P<language>\S*)[^\n]*\n"
@@ -37,6 +38,8 @@ _BLOCK = re.compile(
 )
 _AFTER = re.compile(r"^<!-- after: (\S+) -->$", re.MULTILINE)
 _FILE = re.compile(r"# (\S+\.yaml)\n")
+_COMMAND = re.compile(r"^for .*?^done$|^[^\n]*\S[^\n]*$", re.MULTILINE | re.DOTALL)
+"""A line, or all lines of a loop."""
 
 
 class Block(NamedTuple):
@@ -61,8 +64,8 @@ def prose(page: Path) -> str:
 
 
 def commands(block: Block) -> list[str]:
-    """Command lines of a block, continued ones as one line."""
-    return [line for line in re.sub(r" \\\n\s*", " ", block.text).splitlines() if line.strip()]
+    """Commands of a block: lines, continued ones as one, and loops."""
+    return _COMMAND.findall(re.sub(r" \\\n\s*", " ", block.text))
 
 
 def has_commands(page: Path) -> bool:
@@ -134,7 +137,8 @@ class Reader:
     def _type(self, line: str) -> str:
         words = shlex.split(line, comments=True)
         if words[0] != ".venv/bin/snakemake":
-            return self._once(line, [each for word in words for each in PROGRAMS.get(word, [word])])
+            typed = _PROGRAM.sub(lambda found: shlex.join(PROGRAMS[found[0]]), line)
+            return self._once(line, ["bash", "-e", "-c", typed])
         # The rules themselves run in the tests of the workflow.
         # The last --config counts, so that what the line says goes into it too.
         said = words[words.index("--config") + 1 :] if "--config" in words else []
