@@ -49,30 +49,37 @@ class Sums:
     """Bits behind the binary point of the upper integers."""
     moments: Index
     """(n, 2, 44) upper and lower integers, see `moments`."""
-    rows: Index
-    """(n,) how many."""
-    low: Array
-    high: Array
-    """(n,) range of their targets."""
+    others: Index
+    """(n, 4) what else is known of the rows of a leaf, side by side in memory: their number, and
+    the bits of the range of their targets."""
     pending: int = 0
     """Rows added since the last carry."""
 
     @classmethod
     def nothing(cls, count: int, bits: int = LOGARITHM_BITS) -> "Sums":
         """Sums over no rows."""
-        sums = cls(
-            bits,
-            aligned((count, 2, SUMMED), np.int64),
-            np.empty(count, dtype=np.int64),
-            np.empty(count),
-            np.empty(count),
-        )
+        sums = cls(bits, aligned((count, 2, SUMMED), np.int64), aligned((count, 4), np.int64))
         sums.clear()
         return sums
 
+    @property
+    def rows(self) -> Index:
+        """(n,) how many."""
+        return self.others[:, 0]
+
+    @property
+    def low(self) -> Array:
+        """(n,) least of their targets."""
+        return self.others.view(np.float64)[:, 1]
+
+    @property
+    def high(self) -> Array:
+        """(n,) largest of them."""
+        return self.others.view(np.float64)[:, 2]
+
     def clear(self) -> None:
         """Forget all rows."""
-        self.moments[:], self.rows[:] = 0, 0
+        self.moments[:], self.others[:] = 0, 0
         self.low[:], self.high[:] = np.inf, -np.inf
         self.pending = 0
 
@@ -94,9 +101,10 @@ class Sums:
         """
         if self.pending + len(target) > CARRY_ROWS:
             self.carry()
-        arrays = (self.moments, self.rows, self.low, self.high)
+        others = (self.others, self.others.view(np.float64))
         lines = self.moments.reshape(-1, CACHE_LINE // 8)
-        _add(leaf_numbers, features, target, weight, *arrays, lines, 2.0**self.bits)
+        rows = (leaf_numbers, features, target, weight)
+        _add(*rows, self.moments, lines, *others, 2.0**self.bits)
         self.pending += len(target)
 
     def carry(self) -> None:
@@ -134,13 +142,15 @@ def _add(
     target: Array,
     weight: Array,
     moments: Index,
-    rows: Index,
-    low: Array,
-    high: Array,
     lines: Index,
+    counts: Index,
+    ranges: Array,
     scale: float,
 ) -> None:
-    """Add rows; to bring a number onto a grid, one is added whose last bit is the grid's step."""
+    """Add rows; to bring a number onto a grid, one is added whose last bit is the grid's step.
+
+    `lines` is the memory of `moments`, and `ranges` that of `counts`.
+    """
     values = np.empty(FEATURES + 2)
     products = np.zeros(SUMMED)
     rounded = np.zeros(SUMMED)
@@ -153,9 +163,10 @@ def _add(
     for row in range(len(leaf_numbers)):
         leaf = leaf_numbers[row]
         if row + AHEAD < len(leaf_numbers):
-            first = per_leaf * np.int64(leaf_numbers[row + AHEAD])
+            ahead = np.int64(leaf_numbers[row + AHEAD])
             for line in range(per_leaf):
-                prefetch(lines, first + line)
+                prefetch(lines, per_leaf * ahead + line)
+            prefetch(counts, ahead)
         answer = target[row]
         for k in range(FEATURES):
             values[k] = min(float(features[row, k]), MOST)
@@ -180,9 +191,9 @@ def _add(
             sums[0, n] += upper[n] - _MAGIC_BITS
         for n in range(SUMMED):
             sums[1, n] += lower[n] - _MAGIC_BITS
-        rows[leaf] += 1
-        low[leaf] = min(low[leaf], answer)
-        high[leaf] = max(high[leaf], answer)
+        counts[leaf, 0] += 1
+        ranges[leaf, 1] = min(ranges[leaf, 1], answer)
+        ranges[leaf, 2] = max(ranges[leaf, 2], answer)
 
 
 @numba.njit(cache=True, nogil=True)

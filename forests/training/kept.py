@@ -25,6 +25,8 @@ from forests.training.tree_file import difference, load_tree, save_tree
 
 KIND = "leaf sums"
 SCHEMA = 1
+PART = 1 << 16
+"""Leaves whose sums are read together."""
 
 
 def folder_of(out: str | Path) -> Path:
@@ -132,4 +134,5 @@ def _fill(group: Any, sums: Sums) -> None:
                 f"{group.file.filename}: {name} has shape {group[name].shape}, expected "
                 f"{values.shape}"
             )
-        group[name].read_direct(values)
+        for first in range(0, len(values), PART):
+            values[first : first + PART] = group[name][first : first + PART]

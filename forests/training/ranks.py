@@ -67,11 +67,12 @@ class Ranks:
         operations = {"low": MPI.MIN, "high": MPI.MAX}
         for name, values in sums.arrays():
             for part in np.array_split(values, max(1, values.nbytes // MESSAGE_BYTES)):
-                operation = operations.get(name, MPI.SUM)
+                operation, mine = operations.get(name, MPI.SUM), np.ascontiguousarray(part)
                 if self.first:
-                    self._comm.Reduce(MPI.IN_PLACE, part, operation)
+                    self._comm.Reduce(MPI.IN_PLACE, mine, operation)
+                    part[:] = mine
                 else:
-                    self._comm.Reduce(part, None, operation)
+                    self._comm.Reduce(mine, None, operation)
         if not self.first:
             sums.clear()
 
