@@ -13,10 +13,11 @@ from forests.training.dataset import dataset_of, open_dataset
 from forests.training.exact_sums import Sums
 from forests.training.growers import GROWERS
 from forests.training.growing import grow_trees
-from forests.training.leaves import ANCESTOR_ROWS, add_rows, leaf_of, solve_leaves
+from forests.training.leaves import ANCESTOR_ROWS, solve_leaves
 from forests.training.moments import ENTRIES, fit_errors, solve
 from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
+from forests.training.routing import leaf_of
 from forests.training.spent import Spent
 from forests.training.structure import Rows, TreeLimits, tree_of
 from forests.training.tree_file import load_trees, save_tree
@@ -72,6 +73,11 @@ def stump():
     """One split at feature 0 <= 0, two leaves."""
     index = [np.array(values) for values in ([0, 0, 0], [1, -1, -1], [2, -1, -1])]
     return tree_of(index[0], np.zeros(3), index[1], index[2], np.zeros(PATTERNS))
+
+
+def add_rows(sums, tree, rows):
+    leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
+    sums.add(leaf_numbers, rows.features, rows.target, rows.weight)
 
 
 def fitted(tree, rows, prior):

@@ -19,10 +19,10 @@ from forests.model import FILLED, VOID
 from forests.training.blocks import WINDOW, in_order
 from forests.training.dataset import Dataset, Run, rows_of
 from forests.training.growers import GROWERS, LINEAR
-from forests.training.leaves import leaf_of, packed
 from forests.training.linear_splits import RECORD
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
+from forests.training.routing import leaf_of, packed
 from forests.training.structure import Rows, Tree, rows_together
 from forests.training.subtrees import (
     Subtrees,

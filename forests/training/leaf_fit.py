@@ -19,9 +19,9 @@ from forests.scaling import is_logarithmic
 from forests.training.blocks import WINDOW, in_order
 from forests.training.dataset import STUDIED, Dataset, Run, Samples, joined, rows_of
 from forests.training.exact_sums import Sums, bits_of
-from forests.training.leaves import leaf_of, packed
 from forests.training.options import TrainingOptions
 from forests.training.ranks import Ranks
+from forests.training.routing import leaf_of, packed
 from forests.training.spent import Spent, Stopwatch
 from forests.training.structure import Tree
 

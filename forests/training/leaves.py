@@ -8,26 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from forests.layout import FEATURE_BITS, FEATURE_MASK, pack, place_nodes
+from forests.layout import pack
 from forests.model import Forests
-from forests.scaling import FEATURES, PATTERNS, Features
+from forests.scaling import FEATURES, PATTERNS
 from forests.training.exact_sums import Sums
 from forests.training.moments import ENTRIES, WEIGHT, solve
+from forests.training.routing import leaf_of
 from forests.training.structure import Rows, Tree
 
 THIN = 10
 """Rows below which a leaf takes the bounds of its answers from an ancestor."""
 ANCESTOR_ROWS = 64
 """Rows of the ancestor that a leaf leans on, at least."""
-GROUP = 16
-"""Rows that walk down a tree together."""
 
 
 @dataclass(frozen=True)
@@ -39,80 +38,6 @@ class Leaves:
     low: Array
     high: Array
     """(leaves,) range of the targets seen in the leaf, which bounds its answers."""
-
-
-class PackedTree(NamedTuple):
-    """A tree that rows walk down fast: its nodes as those of the trained forests."""
-
-    roots: NDArray[np.int32]
-    """(128,) see `forests.training.structure.Tree`."""
-    thresholds: NDArray[np.float32]
-    links: NDArray[np.int32]
-    """(nodes, 2) the thresholds in column 0, the links in column 1, see `forests.layout.NODE`."""
-
-
-def packed(tree: Tree) -> PackedTree:
-    """Bring a tree's nodes into the order in which rows come to them.
-
-    Raises UserError if there are too many.
-    """
-    position, nodes = place_nodes(
-        tree.feature, tree.threshold, tree.left, tree.right, tree.leaf, tree.roots
-    )
-    return PackedTree(
-        position[tree.roots].astype(np.int32),
-        nodes.view(np.float32).reshape(-1, 2),
-        nodes.view(np.int32).reshape(-1, 2),
-    )
-
-
-@numba.njit(cache=True, nogil=True)
-def find_leaves(
-    features: Features,
-    pattern: NDArray[np.unsignedinteger[Any]],
-    roots: NDArray[np.int32],
-    thresholds: NDArray[np.float32],
-    links: NDArray[np.int32],
-) -> NDArray[np.int32]:
-    """Leaf number (n,) of each row (n, 7 at least) float32 with its void pattern (n,).
-
-    Rows walk in groups, so that the processor waits for the memory of all of them at once.
-    """
-    leaf_numbers = np.empty(len(features), dtype=np.int32)
-    node = np.empty(GROUP, dtype=np.int64)
-    for first in range(0, len(features), GROUP):
-        rows = min(GROUP, len(features) - first)
-        for row in range(rows):
-            node[row] = roots[pattern[first + row]]
-        walking = rows
-        while walking > 0:
-            walking = 0
-            for row in range(rows):
-                link = links[node[row], 1]
-                if link >= 0:
-                    value = features[first + row, link & FEATURE_MASK]
-                    node[row] = (link >> FEATURE_BITS) + (value > thresholds[node[row], 0])
-                    walking += 1
-        for row in range(rows):
-            leaf_numbers[first + row] = ~links[node[row], 1]
-    return leaf_numbers
-
-
-def leaf_of(
-    tree: Tree | PackedTree, features: Features, pattern: NDArray[np.unsignedinteger[Any]]
-) -> NDArray[np.int32]:
-    """Leaf number (n,) of each row (n, 7 at least) float32 with its void pattern (n,)."""
-    walked = tree if isinstance(tree, PackedTree) else packed(tree)
-    return np.asarray(find_leaves(features, pattern, *walked))
-
-
-def add_rows(sums: Sums, tree: Tree | PackedTree, rows: Rows) -> None:
-    """Add rows to the sums of a tree's leaves.
-
-    Raises UserError, see `Sums.add`.
-    """
-    leaf_numbers = leaf_of(tree, rows.features, rows.pattern)
-    sums.add(leaf_numbers, rows.features, rows.target, rows.weight)
 
 
 class _NodeSums(NamedTuple):

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
 from forests.scaling import FEATURES, PATTERNS
-from forests.training.leaves import leaf_of
 from forests.training.linear_splits import NODE, RECORD, SPLIT_ROWS, derived, grow_nodes
 from forests.training.ranks import Ranks
+from forests.training.routing import leaf_of
 from forests.training.structure import Rows, Tree, TreeLimits, tree_of
 
 TOP_ROWS = 2 * SPLIT_ROWS
