@@ -115,6 +115,10 @@ def test_trees_do_not_depend_on_threads_where_their_tops_have_a_sample_alone(mad
         ({"samples": 10, "distributions": ("normal",)}, "expected uniform or log-uniform"),
         ({"samples": 10, "distributions": ("uniform:1",)}, "as uniform:0:20"),
         ({"samples": 10, "distributions": ("uniform:3:2",)}, "expected low < high"),
+        (
+            {"samples": 10, "distributions": ("uniform", "uniform:0:10")},
+            "'uniform:0:10' is there twice",
+        ),
     ],
 )
 def test_samples_that_cannot_be_made_are_refused(options, message):

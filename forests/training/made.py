@@ -56,8 +56,8 @@ class SampleOptions:
     def parts(self, seed: int) -> list[Settings]:
         """Settings of the samples of each distribution, `seed` being that of the splits.
 
-        Raises UserError if there are no samples, a distribution is unknown, or its range is
-        impossible.
+        Raises UserError if there are no samples, a distribution is unknown or named twice, or its
+        range is impossible.
         """
         if self.samples is None:
             raise UserError(
@@ -65,7 +65,7 @@ class SampleOptions:
                 "generate has written, or how many samples to make"
             )
         share, left = divmod(self.samples, len(self.distributions))
-        return [
+        parts = [
             settings_of(
                 ShardOptions(
                     share + (number < left),
@@ -77,6 +77,12 @@ class SampleOptions:
             )
             for number, words in enumerate(self.distributions)
         ]
+        for number, part in enumerate(parts):
+            if part.moduli in [other.moduli for other in parts[:number]]:
+                raise UserError(
+                    f"distribution {self.distributions[number]!r} is there twice; name each once"
+                )
+        return parts
 
 
 SAMPLE_NAMES = tuple(field.name for field in fields(SampleOptions))
