@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
+from carillon.processes.threads import blas_threads
 from dataset_gen.generate import generate
 from dataset_gen.settings import ShardOptions
 from forests.scaling import PATTERNS
@@ -67,6 +68,16 @@ def test_a_constant_feature_gets_no_slope(cloud):
     cloud.features[:, 3] = -14.5
     (found,) = solve(packed(cloud)[None])
     assert found[3] == 0.0 and (found[[0, 1, 2, 4, 5, 6]] != 0.0).all()
+
+
+def test_coefficients_are_the_same_bits_with_any_threads_of_blas(cloud):
+    clouds = [packed(replace(cloud, target=cloud.target * n)) for n in range(1, 500)]
+    sums = np.array(clouds)
+    with blas_threads(1):
+        one = solve(sums)
+    with blas_threads(2):
+        two = solve(sums)
+    np.testing.assert_array_equal(one, two)
 
 
 def stump():

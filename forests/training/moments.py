@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.processes.threads import blas_threads
 from forests.scaling import FEATURES
 
 ONE, TARGET = FEATURES, FEATURES + 1
@@ -115,6 +116,7 @@ def _reduce(square: Array, right: Array, error: Array) -> None:
             error[p] -= right[i, p] * right[i, p]
 
 
+@blas_threads(1)
 def solve(sums: Array) -> Array:
     """Coefficients (n, 8) of weighted linear fits from their sums (n, 45): slopes, constant.
 
