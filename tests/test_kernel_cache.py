@@ -78,6 +78,49 @@ def test_kernels_of_two_kinds_of_processors_are_kept_side_by_side(kernel, tmp_pa
     assert [kernel("beside", tmp_path, **each)[0] for each in processors] == [2, 2]
 
 
+INNER = """
+import numba
+
+FACTOR = 1.0
+
+@numba.njit(cache=True)
+def inner(x):
+    return 3 * x
+"""
+OUTER = """
+import carillon
+import numba
+from inner import FACTOR, inner
+
+@numba.njit(cache=True)
+def outer(x):
+    return inner(x) * FACTOR
+
+print(outer(1.0), outer.stats.cache_hits.total())
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "result"),
+    [("3 * x", "5 * x", "5.0"), ("FACTOR = 1.0", "FACTOR = 2.0", "6.0")],
+)
+def test_a_kernel_is_compiled_anew_when_what_it_uses_in_another_file_changes(
+    tmp_path, before, after, result
+):
+    (tmp_path / "outer.py").write_text(OUTER)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+    def printed() -> list[str]:
+        done = python("-c", "import outer", env={**os.environ, "PYTHONPATH": path})
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    (tmp_path / "inner.py").write_text(INNER)
+    assert [printed(), printed()] == [["3.0", "0"], ["3.0", "1"]]
+    (tmp_path / "inner.py").write_text(INNER.replace(before, after))
+    assert printed() == [result, "0"]
+
+
 def test_two_that_compile_at_once_never_get_the_code_of_the_other(tmp_path):
     """The second one writes between the index of the first and its code."""
     first, second, later = (caching.IndexDataCacheFile(tmp_path, "kernel", 1) for _ in range(3))

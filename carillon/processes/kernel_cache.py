@@ -9,6 +9,9 @@ the kernels beside the source.
 Kernels for several kinds of processors are in one folder. Numba's index tells them apart, but numba
 numbers the files of code: two processes that compile at once may take one number, and the next run
 may load code for another processor. Here the name of a file tells its content.
+
+Numba compiles a kernel anew when its own file has changed. Here it does, too, when a kernel that it
+calls, or a constant that it uses, has changed in another file, since both are within its code.
 """
 
 import hashlib
@@ -18,7 +21,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -121,6 +124,7 @@ def _mended() -> Iterator[None]:
     if caching is None:  # it is about to be
         return
     caching.IndexDataCacheFile.save = _save
+    caching.Cache.__init__ = _with_stamp_of_what_it_uses(caching.Cache.__init__)
     for elsewhere in (caching.UserProvidedCacheLocator, caching.UserWideCacheLocator):
         elsewhere.ensure_cache_path = _ensure_copy
 
@@ -133,6 +137,34 @@ def _save(self: Any, key: Any, compiled: Any) -> None:
         index[key] = f"{self._index_name.removesuffix('.nbi')}.{content}.nbc"
         self._save_index(index)
     self._save_data(index[key], compiled)
+
+
+def _with_stamp_of_what_it_uses(begin: Callable[[Any, Any], None]) -> Callable[[Any, Any], None]:
+    def begun(self: Any, function: Any) -> None:
+        begin(self, function)
+        file = self._cache_file
+        used = repr(sorted(_used(function)))
+        file._source_stamp = (file._source_stamp, hashlib.sha256(used.encode()).hexdigest())
+
+    return begun
+
+
+def _used(function: Any) -> Iterator[str]:
+    """Kernels that a function calls, by the stamps of their sources, and constants it uses."""
+    cells = zip(function.__code__.co_freevars, function.__closure__ or ())
+    names = {name: cell.cell_contents for name, cell in cells}
+    for name in function.__code__.co_names:
+        if name in function.__globals__:
+            names[name] = function.__globals__[name]
+    for name, value in names.items():
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)
+        if isinstance(value, bool | int | float | str | tuple):
+            yield f"{name} {value!r}"
+        elif file := getattr(getattr(value, "_cache", None), "_cache_file", None):
+            yield f"{name} {file._source_stamp}"
+        elif called is not None:
+            status = os.stat(called.__code__.co_filename)
+            yield f"{name} {status.st_mtime} {status.st_size}"
 
 
 def _ensure_copy(self: Any) -> None:
