@@ -751,7 +751,7 @@ def generate(path: str | Path, samples: int, workers: int = 1, **options: Any) -
 
 
 def train(
-    shards: Sequence[str | Path], out: str | Path, workers: int = 1, **options: Any
+    shards: str | Path | Sequence[str | Path], out: str | Path, workers: int = 1, **options: Any
 ) -> Forests:
     """Train forests on shards of `generate`, or on samples that are never stored.
 
@@ -770,14 +770,17 @@ def train(
     >>> trained.model.forests.trees, same.model.scores == trained.model.scores
     (1, True)
     """
+    from carillon.files.paths import require_writable
     from forests.training.made import SAMPLE_NAMES, SampleOptions, training_data
     from forests.training.options import TrainingOptions
     from forests.training.ranks import Ranks
     from forests.training.train import write_forests
 
+    paths = [str(path) for path in ([shards] if isinstance(shards, str | Path) else shards)]
+    require_writable(out, paths)
     made = {name: options.pop(name) for name in SAMPLE_NAMES if name in options}
     training = TrainingOptions(**options)
-    dataset = training_data([str(path) for path in shards], SampleOptions(**made), training.seed)
+    dataset = training_data(paths, SampleOptions(**made), training.seed)
     write_forests(out, dataset, training, Ranks(), checked("workers", workers, Workers))
     return Forests.load(out)
 

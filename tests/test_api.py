@@ -228,6 +228,15 @@ def test_forests_are_trained_and_coarsen_a_solid(tmp_path):
     assert isinstance(solid.mesh, HexMesh) and solid.n_dofs < 3 * 68
 
 
+def test_forests_take_no_shard_s_place(tmp_path):
+    shard = tmp_path / "shard.h5"
+    ca.generate(shard, samples=10)
+    before = shard.read_bytes()
+    with pytest.raises(ca.UserError, match="is an input and would be replaced"):
+        ca.train(shard, shard, trees=1)
+    assert shard.read_bytes() == before
+
+
 @pytest.mark.mpi
 def test_ranks_solve_together(tmp_path, bar, mpiexec):
     script = tmp_path / "script.py"
