@@ -72,7 +72,7 @@ def test_a_training_that_dies_again_and_again_ends_with_the_same_forests(
     made, forests, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(dataset, "BLOCK", 4096)
-    monkeypatch.setattr(leaf_fit, "SLICE_BLOCKS", 1)
+    monkeypatch.setattr(leaf_fit, "SLICE_SECONDS", 0.0)
     monkeypatch.setattr(leaf_fit, "COSTLY", 0.0)
     path = tmp_path / "forests.h5"
     deaths = 0
@@ -87,6 +87,33 @@ def test_a_training_that_dies_again_and_again_ends_with_the_same_forests(
     write_forests(path, made, QUICK, Ranks(), progress=False)
     assert digest(path) == digest(forests)
     assert not folder_of(path).exists()
+
+
+def test_a_tree_that_cannot_be_kept_does_not_end_the_training(made, forests, tmp_path, caplog):
+    path = tmp_path / "forests.h5"
+    folder_of(path).write_text("no folder")
+    kept = Kept(path, parameters_of(made, QUICK))
+    trained = train_trees(made, QUICK, Ranks(), progress=False, kept=kept)
+    assert sorted(trained.trees) == list(QUICK.jobs)
+    assert "goes on, with this tree not kept" in caplog.text
+
+
+def test_a_kept_tree_under_the_name_of_another_is_refused(made, tmp_path):
+    path = tmp_path / "forests.h5"
+    kept = Dying(path, parameters_of(made, QUICK))
+    with pytest.raises(InterruptedError):
+        train_trees(made, QUICK, Ranks(), progress=False, kept=kept)
+    (folder_of(path) / "tree-0.h5").rename(folder_of(path) / "tree-1.h5")
+    with pytest.raises(UserError, match="is tree 0; remove it"):
+        write_forests(path, made, QUICK, Ranks(), progress=False)
+
+
+def test_what_a_link_names_is_emptied_at_the_end(made, tmp_path):
+    path, elsewhere = tmp_path / "forests.h5", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    folder_of(path).symlink_to(elsewhere)
+    write_forests(path, made, QUICK, Ranks(), progress=False)
+    assert path.exists() and not any(elsewhere.iterdir())
 
 
 def test_what_another_training_has_kept_is_refused(made, tmp_path):
@@ -119,6 +146,10 @@ def test_trees_do_not_depend_on_threads_where_their_tops_have_a_sample_alone(mad
             {"samples": 10, "distributions": ("uniform", "uniform:0:10")},
             "'uniform:0:10' is there twice",
         ),
+        (
+            {"samples": 1, "distributions": ("uniform", "log-uniform")},
+            "1 samples of 2 distributions: expected at least one of each",
+        ),
     ],
 )
 def test_samples_that_cannot_be_made_are_refused(options, message):
@@ -130,6 +161,20 @@ def test_samples_that_cannot_be_made_are_refused(options, message):
 def test_counts_that_are_none_are_refused(text):
     with pytest.raises(ValueError, match="expected a whole number"):
         whole_number(text)
+
+
+def test_blocks_of_any_number_of_samples_are_not_listed():
+    huge = made_dataset(SampleOptions(samples=10**18).parts(0))
+    assert huge.run_of(huge.blocks()[-1])[1] == 10**18
+    (first, *_), *_ = huge.spread(4000)
+    assert 0 <= first[0] < first[1] < 10**18
+
+
+def test_options_of_samples_are_refused_beside_shards(run_cli, tmp_path):
+    """They would change nothing."""
+    words = ("0.h5", "--data-seed", 3, "--out", tmp_path / "f.h5")
+    done = run_cli("forests", "train", *words)
+    assert done.returncode == 2 and "found shards and data-seed 3" in done.stderr
 
 
 def test_shards_and_samples_at_once_are_refused(run_cli, tmp_path):

@@ -309,7 +309,7 @@ def test_trees_grown_apart_are_refused_where_they_do_not_fit(shards, tmp_path):
         (paths[:-1], {}, "tree 3 is missing"),
         ([*paths, paths[0]], {}, "another file"),
         (paths, {"min_leaf": 7}, "min_leaf 30 where 7"),
-        (paths, {"samples": []}, "other shards"),
+        (paths, {"samples": []}, "other samples"),
     ):
         with pytest.raises(UserError, match=message):
             load_trees(chosen, parameters | changed)

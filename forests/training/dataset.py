@@ -102,17 +102,20 @@ class Dataset:
         """Runs of about so many samples, evenly spread: whole hypercubes, some to a block."""
         cubes = -(-self.count // HYPERCUBE)
         number = min(cubes, max(1, -(-samples // HYPERCUBE)))
-        chosen = (np.arange(number) * cubes + cubes // 2) // number
+        whole, rest = divmod(cubes, number)
+        chosen = np.arange(number) * whole + (np.arange(number) * rest + cubes // 2) // number
         return [
             [(run[0] * HYPERCUBE, (run[-1] + 1) * HYPERCUBE) for run in _consecutive(block)]
             for block in np.split(chosen, range(BLOCK_CUBES, number, BLOCK_CUBES))
         ]
 
-    def blocks(self, first: int = 0) -> list[Run]:
-        """Blocks of `BLOCK` samples from a position on; the last one may have fewer."""
-        return [
-            (begin, min(begin + BLOCK, self.count)) for begin in range(first, self.count, BLOCK)
-        ]
+    def blocks(self, first: int = 0) -> range:
+        """First positions of blocks of `BLOCK` samples from a position on, see `run_of`."""
+        return range(first, self.count, BLOCK)
+
+    def run_of(self, block: int) -> Run:
+        """The samples of a block; the last one may have fewer."""
+        return block, min(block + BLOCK, self.count)
 
     def subset(self, samples: int) -> Samples:
         """About so many of the samples that are trained on, evenly spread."""

@@ -5,7 +5,6 @@ the leaves over the samples that were added.
 """
 
 import json
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, fields
@@ -58,7 +57,9 @@ class Kept:
         for job in jobs:
             if self._tree(job).exists():
                 with self._explained():
-                    _, trees[job], took = load_tree(self._tree(job), self._parameters)
+                    number, trees[job], took = load_tree(self._tree(job), self._parameters)
+                    if number != job:
+                        raise UserError(f"{self._tree(job)}: is tree {number}; remove it")
                 spent += took
         return trees, spent
 
@@ -102,8 +103,11 @@ class Kept:
         return LeafSums(nothing.sums, Samples(**held_out), samples, used, spent)
 
     def remove(self) -> None:
-        """Remove all that was kept."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Remove all that was kept; a folder that a link names stays."""
+        with suppress(OSError):
+            for file in self.folder.iterdir():
+                file.unlink()
+            self.folder.rmdir()
 
     @contextmanager
     def _made(self) -> Iterator[None]:
@@ -123,7 +127,7 @@ class Kept:
             yield
         except UserError as error:
             raise UserError(
-                f"{error}, or remove {self.folder} to begin again, or choose another name"
+                f"{error}, or remove {self.folder} to begin again, or name another file to write"
             ) from None
 
 

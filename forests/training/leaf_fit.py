@@ -27,8 +27,8 @@ from forests.training.structure import Tree
 
 logger = logging.getLogger(__name__)
 
-SLICE_BLOCKS = 32
-"""Blocks of a rank between two points at which all ranks have done the same share."""
+SLICE_SECONDS = 10.0
+"""Time between two points at which all ranks have done the same share, about."""
 KEEP_SECONDS = 300.0
 """Time between two times that sums are kept."""
 COSTLY = 20.0
@@ -87,22 +87,27 @@ def add_samples(
     done = ranks.from_one(state.samples)
     adding = _Adding(state, dataset, training, trees)
     blocks = dataset.blocks(done)
-    length = SLICE_BLOCKS * ranks.size
+    least = workers * ranks.size
     kept, cost = time.monotonic(), 0.0
 
     def added() -> Iterator[int]:
         nonlocal kept, cost
         with ThreadPoolExecutor(workers) as pool:
-            for first in range(0, len(blocks), length):
-                chosen = ranks.own(blocks[first : first + length])
+            first, length = 0, least
+            while first < len(blocks):
+                begun = time.monotonic()
+                chosen = map(dataset.run_of, ranks.own(blocks[first : first + length]))
                 held_out = [state.held_out]
                 for block, samples in in_order(pool, adding.block, chosen, WINDOW * workers):
                     held_out.append(block)
                     yield samples * ranks.size
                 state.held_out = joined(held_out)
-                state.samples = blocks[first : first + length][-1][1]
-                due = time.monotonic() - kept > max(keep_seconds, COSTLY * cost)
-                if keep is None or not ranks.from_one(due):
+                first += length
+                state.samples = dataset.run_of(blocks[min(first, len(blocks)) - 1])[1]
+                now = time.monotonic()
+                due = now - kept > max(keep_seconds, COSTLY * cost)
+                due, length = ranks.from_one((due, _next_length(length, now - begun, least)))
+                if keep is None or not due:
                     continue
                 _gather(state, ranks)
                 state.spent += clock.read()
@@ -121,6 +126,13 @@ def add_samples(
     _gather(state, ranks)
     state.samples = dataset.count
     state.spent += clock.read()
+
+
+def _next_length(length: int, took: float, least: int) -> int:
+    """Blocks of the next slice, after one that took so many seconds."""
+    if took < SLICE_SECONDS / 2:
+        return 2 * length
+    return max(least, length // 2) if took > 2 * SLICE_SECONDS else length
 
 
 class _Adding:

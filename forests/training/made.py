@@ -64,6 +64,11 @@ class SampleOptions:
                 "no training data: found neither shards nor --samples; name the shards that "
                 "generate has written, or how many samples to make"
             )
+        if self.samples < len(self.distributions):
+            raise UserError(
+                f"{self.samples} samples of {len(self.distributions)} distributions: expected at "
+                "least one of each"
+            )
         share, left = divmod(self.samples, len(self.distributions))
         parts = [
             settings_of(
@@ -97,11 +102,19 @@ def training_data(
     `seed`: of the splits; `own`: shards that are checked whole, see `open_dataset`. Raises
     UserError if there are both or none, or they cannot be used.
     """
-    if shards and made.samples is not None:
+    if not shards:
+        return made_dataset(made.parts(seed))
+    if made.samples is not None:
         raise UserError(
             f"found {len(shards)} shards and {made.samples:,} samples to make, expected one of both"
         )
-    return open_dataset(shards, own) if shards else made_dataset(made.parts(seed))
+    for name in SAMPLE_NAMES:
+        if getattr(made, name) != getattr(SampleOptions(), name):
+            raise UserError(
+                f"found shards and {name.replace('_', '-')} {getattr(made, name)}, which is for "
+                "samples that are made where they are used; leave it out, as shards have their own"
+            )
+    return open_dataset(shards, own)
 
 
 def _range_of(words: str) -> dict[str, Any]:

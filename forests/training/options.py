@@ -20,10 +20,12 @@ class TrainingOptions:
     trees: Annotated[int, between(1, 1000)] = option(3, "of each of the two forests")
     depth: Annotated[int, between(1, 1000)] = option(20, "of a tree, at most")
     max_leaves: Annotated[int, between(1, MOST_LEAVES)] = option(
-        30_000, "of a tree, at most; 56 bytes each"
+        30_000, "of a tree, at most, but at least one a void pattern; 56 bytes each"
     )
     min_leaf: Count = option(30, "rows of the subset that a leaf needs")
-    structure_rows: Count = option(5_000_000, "rows of the subset that splits are chosen from")
+    structure_rows: Count = option(
+        5_000_000, "rows of the subset that splits are chosen from, rounded up to 1,024 samples"
+    )
     prior: Annotated[float, between(1e-9, 1e9)] = option(
         0.5, "rows that the surroundings of a leaf count for in it"
     )

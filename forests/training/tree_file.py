@@ -83,7 +83,7 @@ def difference(theirs: dict[str, Any], expected: dict[str, Any]) -> str:
     expected = json.loads(json.dumps(expected))
     name = next(key for key in expected | theirs if theirs.get(key) != expected.get(key))
     if name == "samples":
-        return "was grown on other shards; name the same ones, or grow it again"
+        return "was grown on other samples; name the same ones, or grow it again"
     return (
         f"was grown with {name} {theirs.get(name)} where {expected.get(name)} is asked for; grow "
         "it again"

@@ -5,6 +5,8 @@ import os
 from tempfile import TemporaryDirectory
 
 from carillon.command_line.outputs import require_outputs
+from carillon.errors import UserError
+from carillon.files.paths import cause
 from carillon.parameters.command_line import collect
 from forests.commands.training import add_training, add_workers, data_of
 from forests.training.options import TrainingOptions
@@ -26,6 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_outputs(parser)
 
 
+def _make(folder: str) -> None:
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise UserError(
+            f"{folder}: cannot be made ({cause(error)}), expected a folder for forests"
+        ) from None
+
+
 def run(arguments: argparse.Namespace) -> None:
     """Train on each number of rows and print the scores."""
     require_outputs(arguments, arguments.datasets)
@@ -34,7 +45,7 @@ def run(arguments: argparse.Namespace) -> None:
     counts = training.require_counts(arguments.rows)
     with TemporaryDirectory() as temporary:
         folder = arguments.folder or temporary
-        os.makedirs(folder, exist_ok=True)
+        _make(folder)
         rows = training.learning_curve(dataset, how, counts, folder, arguments.workers)
     if arguments.plot:
         from studies.forests.plots import save_curve  # matplotlib takes a while to load

@@ -175,7 +175,10 @@ def learning_curve(
 def _trained(path: Path, dataset: Dataset, training: TrainingOptions, workers: int) -> Model:
     if not path.exists():
         write_forests(path, dataset, training, Ranks(), workers)
-    model = load_model(path)
+    try:
+        model = load_model(path)
+    except UserError as error:
+        raise UserError(f"{error}; remove it to train it again") from None
     theirs = json.loads(model.provenance["parameters"])
     mine = json.loads(json.dumps(parameters_of(dataset, training)))
     if theirs != mine:
