@@ -95,6 +95,17 @@ def test_ranks_of_three_nodes_share_no_memory(cluster, tmp_path):
     assert str([(node, 1) for node in NODES]) in slurm_cluster.logs(tmp_path)
 
 
+@pytest.mark.system
+def test_mpiexec_starts_ranks_that_find_each_other_on_two_nodes(cluster, tmp_path):
+    command = f"mpiexec -n 2 {sys.executable} -m mpi4py -m carillon modes builtin:bar"
+    slurm_cluster.batch(
+        tmp_path,
+        f"--wrap={command} --resolution 10 --modes 16 --out modes.h5",
+        options=["--nodes=2", "--ntasks=2", "--mem-per-cpu=900M"],
+    )
+    assert read_modes(str(tmp_path / "modes.h5")).attributes["ranks"] == 2
+
+
 def test_shards_of_an_array_are_those_of_one_process(cluster, here, tmp_path):
     before = len(cluster.ended())
     slurm_cluster.batch(

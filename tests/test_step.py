@@ -42,8 +42,16 @@ def test_a_directory_that_the_user_has_chosen_stays(tmp_path):
     assert [directory for directory, _ in printed(**{DIRECTORY: chosen})] == [chosen, chosen]
 
 
+REMOTE = {
+    "OMPI_COMM_WORLD_SIZE": "2",
+    "OMPI_COMM_WORLD_LOCAL_SIZE": "1",
+    "SLURM_STEP_NUM_NODES": "1",
+}
+"""What a rank of `mpiexec` on another node is told: its daemon is a step of that node alone."""
+
+
 @pytest.mark.parametrize(
-    "chosen", [{"OMPI_MCA_pml": "cm"}, {"PMIX_RANK": "0"}, {"OMPI_COMM_WORLD_SIZE": "2"}]
+    "chosen", [{"OMPI_MCA_pml": "cm"}, {"PMIX_RANK": "0"}, {"OMPI_COMM_WORLD_SIZE": "2"}, REMOTE]
 )
 def test_ranks_and_users_choose_their_network(chosen):
     environment = dict(chosen)

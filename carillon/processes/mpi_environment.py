@@ -215,6 +215,12 @@ def _launched(environment: Mapping[str, str]) -> bool:
 
 
 def _on_one_machine(environment: Mapping[str, str]) -> bool:
-    """Whether all ranks of a launcher are on this machine, as far as it tells."""
+    """Whether all ranks of a launcher are on this machine, as far as it tells.
+
+    `mpiexec` starts its daemon on each other node by a step of SLURM's that has one node, so that
+    what it tells itself goes before what SLURM tells.
+    """
     size, here = (environment.get(f"OMPI_COMM_WORLD_{name}SIZE") for name in ("", "LOCAL_"))
-    return (size is not None and size == here) or environment.get("SLURM_STEP_NUM_NODES") == "1"
+    if size is not None and here is not None:
+        return size == here
+    return environment.get("SLURM_STEP_NUM_NODES") == "1"
