@@ -66,7 +66,6 @@ onstart:
         places = [workflow.main_snakefile, Path.cwd(), *workflow.overwrite_configfiles]
         try:
             submission.require_plain(places, workflow.config_settings.config)
-            submission.submit_singly(workflow)
         except UserError as error:
             raise WorkflowError(str(error)) from None
     for sentence in pinned_meshes.of_run(config):

@@ -6,11 +6,9 @@ Traces of MPI in the environment would reach every job.
 import os
 import re
 from subprocess import CompletedProcess
-from types import SimpleNamespace
 
 import pytest
 
-from carillon.errors import UserError
 from tests.programs import python
 from tests.workflow_runs import CHECKOUT, PROFILE
 from workflow import submission
@@ -114,23 +112,6 @@ def test_a_job_counts_the_cores_of_the_run_and_not_those_of_its_node(cores, expe
     assert submission.cores_of_run(node, in_job=True) == 1
     assert submission.cores_of_run(cores, in_job=False) == expected
     assert submission.cores_of_run(node, in_job=True) == expected
-
-
-def cluster_run(arrays: str) -> SimpleNamespace:
-    """A run of Snakemake's with a rule on several ranks, whose executor makes arrays of rules."""
-    executor = SimpleNamespace(array_jobs=set(arrays.split(",")))
-    rules = [SimpleNamespace(name="grow_tree", resources={"mpi": "srun"})]
-    rules += [SimpleNamespace(name="generate_shard", resources={})]
-    return SimpleNamespace(scheduler=SimpleNamespace(_executor=executor), rules=rules)
-
-
-def test_jobs_on_several_ranks_are_no_array():
-    """The executor would run the first of them in all."""
-    run = cluster_run("grow_tree,generate_shard")
-    submission.submit_singly(run)
-    assert run.scheduler._executor.array_jobs == {"generate_shard"}
-    with pytest.raises(UserError, match="jobs with MPI ranks cannot be an array"):
-        submission.submit_singly(cluster_run("all"))
 
 
 def test_jobs_on_one_rank_have_no_mpi(printed):

@@ -1,4 +1,4 @@
-"""What jobs of a cluster get beside the rules: cores, nodes, arrays, and their command line.
+"""What jobs of a cluster get beside the rules: cores, nodes, and their command line.
 
 Snakemake hands the command line of a run on to its jobs in double quotes, in which a shell looks
 for `$`, backticks, quotes and backslashes.  Of a configuration that is but the name of its file.
@@ -51,23 +51,6 @@ def hand_on_places(starts_ranks: bool) -> None:
         os.environ[_ALLOCATION] = json.dumps(here)
     elif starts_ranks:
         os.environ.update(json.loads(os.environ.get(_ALLOCATION, "{}")))
-
-
-def submit_singly(workflow: Any) -> None:
-    """Take rules with several ranks out of those that SLURM's executor submits as arrays.
-
-    In every job of such an array it would run the first one. To be called when a run starts.
-    Raises UserError if all rules are to be arrays.
-    """
-    executor = getattr(workflow.scheduler, "_executor", None)
-    arrays: set[str] = getattr(executor, "array_jobs", set())
-    ranked = {rule.name for rule in workflow.rules if "mpi" in rule.resources}
-    if "all" in arrays and ranked:
-        raise UserError(
-            "--slurm-array-jobs=all: jobs with MPI ranks cannot be an array; name the rules, as "
-            "slurm/config.yaml does"
-        )
-    arrays -= ranked
 
 
 def require_plain(paths: Iterable[str | Path], given: Mapping[str, Any]) -> None:
