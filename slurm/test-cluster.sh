@@ -19,9 +19,9 @@
 # `start FOLDER --while PROCESS` stops the cluster when that process has ended, by whatever hand.
 # Everything is written in FOLDER, but for a link /etc/slurm/slurm.conf while it runs; a machine
 # that has a SLURM of its own is left alone. CPUS and MEMORY_MB in the environment say what each node
-# has, the machine's cores and its share of three quarters of the memory otherwise. SHARED, separated
-# by colons, names folders in /tmp that all nodes see besides FOLDER, the checkout and the one where
-# the cluster is started. There is no accounting (sacct).
+# has, the machine's cores and three quarters of its memory otherwise, which all nodes share. SHARED,
+# separated by colons, names folders in /tmp that all nodes see besides FOLDER, the checkout and the
+# one where the cluster is started. There is no accounting (sacct).
 set -euo pipefail
 
 # Where all of SLURM's programs look, also in jobs, whose environment may be another one.
@@ -111,7 +111,7 @@ MinJobAge=600
 # A job of the second partition takes the place of one of the first.
 PreemptType=preempt/partition_prio
 PreemptMode=REQUEUE
-NodeName=$nodes NodeAddr=$addresses CPUs=$cpus RealMemory=${MEMORY_MB:-$((memory / ${COUNT:-1}))} State=UNKNOWN
+NodeName=$nodes NodeAddr=$addresses CPUs=$cpus RealMemory=${MEMORY_MB:-$memory} State=UNKNOWN
 PartitionName=compute Nodes=ALL Default=YES MaxTime=INFINITE State=UP PriorityTier=1
 PartitionName=urgent Nodes=ALL MaxTime=INFINITE State=UP PriorityTier=2 PreemptMode=OFF
 END

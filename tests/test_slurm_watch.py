@@ -33,6 +33,23 @@ def test_a_job_that_failed_between_two_answers_is_told(tmp_path, answer, capsys)
     assert line.startswith("SLURM: job 7 on n2 has failed: OUT_OF_MEMORY (OutOfMemory)")
 
 
+def test_a_job_that_no_node_can_run_is_told_with_what_to_do(tmp_path, answer, capsys):
+    watch = Watch(tmp_path)
+    answer("38|FAILED||BadConstraints")
+    watch.tell()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("SLURM: job 38 has failed") and "ask for less by `resources`" in line
+
+
+def test_a_job_that_was_put_back_before_the_first_answer_is_told_once(tmp_path, answer, capsys):
+    watch = Watch(tmp_path)
+    for _ in range(2):
+        answer("131|PENDING||BeginTime")
+        watch.tell()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("SLURM: job 131 was stopped by SLURM and is back in the queue, unless")
+
+
 def test_what_commands_waited_for_is_told_from_now_on(tmp_path, capsys):
     log = tmp_path / patient_slurm.LOG
     log.write_text("earlier\n")

@@ -20,6 +20,13 @@ POLL_SECONDS = 1.0
 _AT_WORK = ("RUNNING", "COMPLETING", "SUSPENDED", "STAGE_OUT")
 _WAITING = ("PENDING", "REQUEUED", "REQUEUE_HOLD", "CONFIGURING")
 _GOOD = ("COMPLETED", "CANCELLED")
+_LATER = "BeginTime"
+"""Reason of a job that SLURM has put back into the queue, where it stays for two minutes."""
+_ADVICE = {
+    "BadConstraints": "no node has the memory, cores or nodes that it asks for: ask for less by "
+    "`resources` in the configuration"
+}
+"""What to do about a reason."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +59,24 @@ def sentence(number: str, before: Fate, now: Fate) -> str | None:
     'job 7 on n2 was stopped by SLURM and is back in the queue'
     >>> sentence("7", at_work, Fate("OUT_OF_MEMORY", "n2", "OutOfMemory"))
     'job 7 on n2 has failed: OUT_OF_MEMORY (OutOfMemory)'
+    >>> sentence("7", Fate("PENDING", "", "Resources"), Fate("PENDING", "", "BeginTime"))
+    'job 7 was stopped by SLURM and is back in the queue, unless it was submitted with --begin'
     >>> sentence("7", at_work, Fate("COMPLETED", "n2", "None"))
     """
     if before.at_work and now.state in _WAITING:
         return f"job {number} on {before.nodes} was stopped by SLURM and is back in the queue"
+    if now.reason == _LATER and before.reason != _LATER:
+        return (
+            f"job {number} was stopped by SLURM and is back in the queue, unless it was submitted "
+            "with --begin"
+        )
     if before.at_work and now.at_work and before.nodes != now.nodes:
         return f"job {number} on {before.nodes} was stopped by SLURM and runs again on {now.nodes}"
     if before.state != now.state and now.state not in (*_AT_WORK, *_WAITING, *_GOOD):
         nodes = now.nodes or before.nodes
-        return f"job {number} on {nodes} has failed: {now.state} ({now.reason})"
+        place, advice = f" on {nodes}" if nodes else "", _ADVICE.get(now.reason)
+        more = f"; {advice}" if advice else ""
+        return f"job {number}{place} has failed: {now.state} ({now.reason}){more}"
     return None
 
 
@@ -99,7 +115,8 @@ class Watch:
         for number, fate in now.items():
             earlier = before.get(number, Fate("PENDING", "", ""))
             if text := sentence(number, earlier, fate):
-                say(f"SLURM: {text}{_state_of(earlier.nodes or fate.nodes)}")
+                nodes = earlier.nodes or fate.nodes
+                say(f"SLURM: {text}{_state_of(nodes) if nodes else ''}")
 
     def _lines(self) -> list[str]:
         """New lines of the log of the patient commands."""
