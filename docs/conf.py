@@ -39,3 +39,6 @@ html_show_sourcelink = False
 html_copy_source = False
 html_math_renderer = "mathml"
 html_theme_options = {"navigation_with_keys": True}
+
+# Commands stand in descriptions, too: -- stays what it is.
+smartquotes_action = "qe"

@@ -1,5 +1,6 @@
 """Digests of result files: equal for equal results, and of nothing else than results."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+import carillon as ca
 from carillon.errors import UserError
 from sound.project.design_file import SCHEMA, write_design
 from tests.small_design import small_design
@@ -19,6 +21,23 @@ def design(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("design") / "design.h5"
     write_design(path, small_design())
     return path
+
+
+def test_of_two_folders_what_differs_is_told(design, tmp_path, capsys):
+    for folder, names in (("one", "ab"), ("two", "abc")):
+        (tmp_path / folder).mkdir()
+        for name in names:
+            shutil.copy(design, tmp_path / folder / f"{name}.h5")
+    told = []
+    for _ in range(2):
+        assert main(["digest", str(tmp_path / "one"), str(tmp_path / "two")]) == 0
+        told.append(capsys.readouterr().out.splitlines()[-1])
+        ca.generate(tmp_path / "b.h5", 10)
+        (tmp_path / "b.h5").rename(tmp_path / "two" / "b.h5")
+    assert told == [
+        "2 files in both, all equal; 1 in one of them alone",
+        "2 files in both, 1 differ: b.h5; 1 in one of them alone",
+    ]
 
 
 def test_equal_designs_have_equal_digests_however_long_they_took(design, tmp_path):

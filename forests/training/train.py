@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.records import provenance
 from forests.model import Model, save_model
@@ -64,6 +65,8 @@ def train_trees(
     state = sums_of(trees, training)
     if kept is not None:
         state = ranks.agree(lambda: kept.sums(state) if ranks.first else state)
+        told = progress and ranks.first and state.samples > 0
+        say(f"{kept.folder}: going on after {state.samples:,} samples", told)
     keep = None if kept is None else kept.keep_sums
     add_samples(state, dataset, training, trees, ranks, workers, progress, keep, keep_seconds)
     if not ranks.first:
@@ -96,6 +99,8 @@ def _grow(
     spent, clock = Spent(), Stopwatch()
     if kept is not None:
         trees, spent = ranks.agree(lambda: kept.trees(training.jobs))
+        told = progress and ranks.first and len(trees) > 0
+        say(f"{kept.folder}: going on with {len(trees)} of {len(training.jobs)} trees", told)
     missing = [job for job in training.jobs if job not in trees]
     for job, tree in grow_trees(dataset, training, missing, ranks, workers, progress):
         trees[job] = tree

@@ -32,13 +32,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a digest for every file."""
-    digests = {str(path): digest(path) for path in _files(arguments.paths)}
+    """Print a digest for every file, and of two folders what differs."""
+    digests = {path: digest(path) for path in _files(arguments.paths)}
     if arguments.json:
-        print(json.dumps(digests, indent=2))
-    else:
-        print("\n".join(f"{value}  {path}" for path, value in digests.items()))
+        print(json.dumps({str(path): value for path, value in digests.items()}, indent=2))
+        return 0
+    print("\n".join(f"{value}  {path}" for path, value in digests.items()))
+    if len(arguments.paths) == 2 and all(path.is_dir() for path in arguments.paths):
+        print(_comparison(digests, *arguments.paths))
     return 0
+
+
+def _comparison(digests: dict[Path, str], one: Path, other: Path) -> str:
+    """How many files two folders have in common, and which of them differ."""
+    here, there = (
+        {
+            str(path.relative_to(folder)): value
+            for path, value in digests.items()
+            if folder in path.parents
+        }
+        for folder in (one, other)
+    )
+    both = sorted(set(here) & set(there))
+    different = [name for name in both if here[name] != there[name]]
+    alone = len(here) + len(there) - 2 * len(both)
+    verdict = "all equal" if not different else f"{len(different)} differ: {', '.join(different)}"
+    return f"{len(both)} files in both, {verdict}; {alone} in one of them alone"
 
 
 def digest(path: Path) -> str:

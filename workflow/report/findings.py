@@ -29,16 +29,16 @@ def findings(tables: dict[str, Table], refine_to: float | None = None) -> dict[s
         # Worst eigenvalue of any model; rms frequency errors of the coarsened mesh.
         "hcms_error": summary["hcms_error"].max(),
         "hcms_ec_error": summary["hcms_ec_error"].max(),
-        "ddfem_error": summary["ddfem_error"].median(),
+        "ddfem_error": _median(summary["ddfem_error"]),
         "ddfem_errors": (summary["ddfem_error"].min(), summary["ddfem_error"].max()),
-        "average_error": coarsened["average_hcms_ec_rms"].median(),
-        "galerkin_error": coarsened["galerkin_hcms_ec_rms"].median(),
+        "average_error": _median(coarsened["average_hcms_ec_rms"]),
+        "galerkin_error": _median(coarsened["galerkin_hcms_ec_rms"]),
         # Of the solve of a design: median, least and greatest over the solids, or None.
         "design": {key: spread_of(tables["design"], key) for key in QUANTITIES},
         "costs": costs(tables, refine_to),
         # SLEPc's time over that of HCMS + EC on the same mesh.
-        "fine_ratio": (times["truth"] / times["hcms_ec"]).median(),
-        "coarse_ratio": (times["ddfem_slepc"] / times[FAST])[were].median(),
+        "fine_ratio": _median(times["truth"] / times["hcms_ec"]),
+        "coarse_ratio": _median((times["ddfem_slepc"] / times[FAST])[were]),
         "proven": residual < PROVEN_RESIDUAL and (counts[0] == counts[1]).all(),
         "residual": residual,
         "elastic_modes": len(frequencies),
@@ -56,6 +56,11 @@ def _frame(table: Table) -> pd.DataFrame:
     frame = pd.DataFrame(table.rows, columns=[column.key for column in table.columns])
     numbers = [column.key for column in table.columns if column.kind != "text"]
     return frame.astype(dict.fromkeys(numbers, float))
+
+
+def _median(values: pd.Series) -> float:
+    """Median of the numbers among values, no number if there are none."""
+    return float(values.dropna().median())
 
 
 def headline(count: int, missed: int) -> str:

@@ -85,8 +85,9 @@ def design(run: Run, table: Table, design: dict[str, Any]) -> list[Any]:
     about = html(
         """A design changes the material of a solid and asks for its modes again, many times. What
         it solves each time, the mesh coarsened by regression forests and to an eigenvalue error of
-        10⁻², was timed beside SLEPc, alone on the machine, and was {} faster on every solid. It is
-        timed on the same solids with {} modes{} ({} unknowns); the spectra below are in full.{}""",
+        10⁻², was timed beside SLEPc, while nothing else of the run ran, and was {} faster on
+        every solid. It is timed on the same solids with {} modes{} ({} unknowns); the spectra below
+        are in full.{}""",
         "" if faster else Markup("<em>not</em>"),
         times["modes"],
         of_full,
