@@ -89,15 +89,6 @@ def test_a_training_that_dies_again_and_again_ends_with_the_same_forests(
     assert not folder_of(path).exists()
 
 
-def test_a_tree_that_cannot_be_kept_does_not_end_the_training(made, forests, tmp_path, caplog):
-    path = tmp_path / "forests.h5"
-    folder_of(path).write_text("no folder")
-    kept = Kept(path, parameters_of(made, QUICK))
-    trained = train_trees(made, QUICK, Ranks(), progress=False, kept=kept)
-    assert sorted(trained.trees) == list(QUICK.jobs)
-    assert "goes on, with this tree not kept" in caplog.text
-
-
 def test_a_kept_tree_under_the_name_of_another_is_refused(made, tmp_path):
     path = tmp_path / "forests.h5"
     kept = Dying(path, parameters_of(made, QUICK))

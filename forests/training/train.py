@@ -1,12 +1,10 @@
 """Train both forests on fitted blocks and score them on blocks held out."""
 
-import logging
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from carillon.command_line.progress import say
-from carillon.errors import UserError
 from carillon.records import provenance
 from forests.model import Model, save_model
 from forests.training.dataset import Dataset, Samples
@@ -19,8 +17,6 @@ from forests.training.ranks import Ranks
 from forests.training.scores import held_out_scores, uniform_scores
 from forests.training.spent import Spent, Stopwatch, peak_memory
 from forests.training.structure import Tree
-
-logger = logging.getLogger(__name__)
 
 Grown = tuple[dict[int, Tree], Spent]
 """Trees by number, and the time that growing them took."""
@@ -107,10 +103,7 @@ def _grow(
         took = clock.read()
         spent += took
         if kept is not None and ranks.first:
-            try:
-                kept.keep_tree(job, tree, took)
-            except UserError as error:
-                logger.warning(f"{error}; the training goes on, with this tree not kept")
+            kept.keep_tree(job, tree, took)
     return trees, spent
 
 
