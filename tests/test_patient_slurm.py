@@ -88,6 +88,13 @@ def test_without_accounting_the_queue_answers(slurm):
     assert run([*question]).returncode == 1
 
 
+@pytest.mark.parametrize("command", ["sacctmgr", "sshare"])
+def test_what_cannot_tell_accounts_knows_none(slurm, command):
+    _, run = slurm()
+    done = run([command, "--nonsense"])
+    assert (done.returncode, done.stdout) == (0, "")
+
+
 def test_jobs_keep_the_comment_that_tells_a_killed_runs_jobs(slurm):
     folder, run = slurm()
     run(SUBMIT)

@@ -9,7 +9,9 @@ run:
 `sbatch` submits again when there was no answer, unless a job that bears its mark is in the queue,
 and gives each task of an array its own command;
 `squeue` tells of a job that was submitted and is no longer known that its state is `UNKNOWN`,
-whereupon Snakemake looks for its files; `sacct` answers by `squeue` where it cannot itself.
+whereupon Snakemake looks for its files; `sacct` answers by `squeue` where it cannot itself;
+`sacctmgr` and `sshare` know no account where they cannot answer, whereupon Snakemake takes the one
+that the profile names. It would wait for ever otherwise.
 
 It runs as a program of its own, with nothing but the standard library.
 """
@@ -34,7 +36,7 @@ FOLDER = Path(".snakemake", "slurm-commands")
 """Folder of the commands and of what they remember, in the working directory of a run."""
 LOG = "log"
 """File in there that tells what Snakemake does not."""
-COMMANDS = ("sbatch", "squeue", "sacct")
+COMMANDS = ("sbatch", "squeue", "sacct", "sacctmgr", "sshare")
 PATIENCE_SECONDS = 3600.0
 """Time for which jobs are submitted again while SLURM does not answer."""
 PAUSE_SECONDS = 10.0
@@ -86,6 +88,8 @@ def main(folder: str, command: str, *arguments: str) -> int:
             return slurm.tell_states(arguments)
         case "sacct":
             return slurm.account(arguments)
+        case "sacctmgr" | "sshare":
+            return slurm.tell_accounts(command, arguments)
         case _:
             return slurm.passed_on(command, arguments)
 
@@ -174,6 +178,13 @@ class Slurm:
         sys.stdout.write(done.stdout)
         sys.stderr.write(done.stderr)
         return done.returncode
+
+    def tell_accounts(self, command: str, arguments: Sequence[str]) -> int:
+        """Tell the accounts of a user; none where SLURM has no answer, or not this command."""
+        done = self._run(command, arguments)
+        if done.returncode == 0:
+            sys.stdout.write(done.stdout)
+        return 0
 
     def _say(self, text: str) -> None:
         with (self._folder / LOG).open("a") as file:
