@@ -185,7 +185,7 @@ def test_of_two_users_who_submit_the_same_jobs_one_is_told_of_the_other(
     disk.seen.chmod(0o777)
     everybody = ("sh", "-c", 'umask 0; exec "$@"', "sh")
     other = (*everybody, "setpriv", "--reuid=games", "--regid=games", "--clear-groups")
-    own_cache = {"CARILLON_CACHE": "/mnt/cache", "HOME": "/mnt"}
+    own_cache = {"CARILLON_CACHE": "/tmp/cache", "HOME": "/tmp"}
     tried = cluster.on("n1", *other, sys.executable, "-c", "import dataset_gen")
     if tried.returncode:
         pytest.skip(f"another user cannot run the programs here: {tried.stderr[-200:]}")
