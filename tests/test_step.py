@@ -47,7 +47,7 @@ REMOTE = {
     "OMPI_COMM_WORLD_LOCAL_SIZE": "1",
     "SLURM_STEP_NUM_NODES": "1",
 }
-"""What a rank of `mpiexec` on another node is told: its daemon is a step of that node alone."""
+"""Variables of a rank that `mpiexec` starts on another node, by a step of that node alone."""
 
 
 @pytest.mark.parametrize(

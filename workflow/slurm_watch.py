@@ -26,7 +26,7 @@ _ADVICE = {
     "BadConstraints": "no node has the memory, cores or nodes that it asks for: ask for less by "
     "`resources` in the configuration"
 }
-"""What to do about a reason."""
+"""What to do about a job that failed for one of these reasons of SLURM's."""
 
 
 @dataclass(frozen=True)

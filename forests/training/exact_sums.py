@@ -64,17 +64,17 @@ class Sums:
 
     @property
     def rows(self) -> Index:
-        """(n,) how many."""
+        """(n,) number of each leaf's rows."""
         return self.others[:, 0]
 
     @property
     def low(self) -> Array:
-        """(n,) least of their targets."""
+        """(n,) least target of each leaf's rows."""
         return self.others.view(np.float64)[:, 1]
 
     @property
     def high(self) -> Array:
-        """(n,) largest of them."""
+        """(n,) largest target of each leaf's rows."""
         return self.others.view(np.float64)[:, 2]
 
     def clear(self) -> None:
