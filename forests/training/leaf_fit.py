@@ -103,7 +103,7 @@ def add_samples(
                     yield samples * ranks.size
                 state.held_out = joined(held_out)
                 first += length
-                state.samples = dataset.run_of(blocks[min(first, len(blocks)) - 1])[1]
+                state.samples = dataset.run_of(blocks[:first][-1])[1]
                 now = time.monotonic()
                 due = now - kept > max(keep_seconds, COSTLY * cost)
                 due, length = ranks.from_one((due, _next_length(length, now - begun, least)))
