@@ -5,7 +5,6 @@ Every rank makes the same checks, and one that fails ends them all.
 
 import os
 import sys
-import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from carillon.errors import UserError
+from carillon.errors import ConvergenceError, UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import hexmesh_from_grid
@@ -39,8 +38,9 @@ from solver.hcms.counts import Tally
 from solver.hcms.merge import Reduced, all_pairs
 from solver.hcms.scalapack import grid_side, shared_pairs
 from solver.hcms.synthesis import synthesize
-from solver.linear import LinearSolver
+from solver.linear import LinearSolver, rank_tree
 from solver.linear.multigrid import Multigrid
+from solver.linear.shared_front import SharedFactor
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from tests import cut_solids, solids
 
@@ -400,9 +400,6 @@ def missed_copies_are_found() -> None:
     assert inertia.counted == inertia.computed + 2
     linear = LinearSolver("multifrontal", layout)
     assert count_beyond(system, poorer, linear.count_below) == inertia
-    with on_machines_of_their_own():
-        linear = LinearSolver("mumps", layout)
-    assert count_beyond(system, poorer, linear.count_below) == inertia
     again, inertia = complete(system, poorer, inertia)
     assert inertia.counted == inertia.computed
     assert again.added == 2
@@ -422,35 +419,57 @@ def multigrid_is_the_same_bits_again() -> None:
     assert all((other == first).all() for other in others)
 
 
-def one_rank_factorises_for_all() -> None:
-    model = solids.random_box(9, 6, 5)
-    values = solids.dense_eigenvalues(model)
-    shift = 0.5 * (values[11] + values[12])
-    local_mesh = distribute(on_first(model), PARTS, comm=COMM)
+def all_ranks_factorise() -> None:
+    """As many subdomains as ranks, more than ranks, and a solid that the ranks cut in pieces."""
+    whole = solids.random_box(9, 6, 5)
+    for model, by_planes in ((whole, True), (whole, False), (solids.random_box(17, 2, 1), True)):
+        values = solids.dense_eigenvalues(model)
+        local_mesh = distribute(on_first(model), PARTS, comm=COMM, by_planes=by_planes)
+        layout = Layout.of_local_mesh(local_mesh, COMM)
+        system = assemble(local_mesh, COMM, layout)
+        linear = LinearSolver("auto", layout)
+        assert linear.method == "multifrontal"
+        block = np.random.default_rng(COMM.rank).standard_normal((len(system.rigid), 5))
+        for below in (0, 12, 40, len(values)):
+            shift = 0.5 * (values[below - 1] + values[below]) if 0 < below < len(values) else 0.0
+            shift = shift or (1.1 * values[-1] if below else -0.1 * values[6])
+            inverse = linear.inverse(system, shift)
+            assert inverse.negative == linear.count_below(system, shift) == below
+            found = inverse.solve(block)
+            residual = system.times_stiffness(found) - shift * system.times_mass(found) - block
+            assert np.abs(residual).max() < 1e-9
+            again = linear.inverse(system, shift)
+            assert (again.solve(block) == found).all()
+            assert (inverse.solve(block) == found).all()
+            inverse.destroy()
+
+
+def a_rank_that_fails_to_factorise_ends_all() -> None:
+    local_mesh = distribute(on_first(solids.random_box(9, 6, 5)), comm=COMM, by_planes=True)
     layout = Layout.of_local_mesh(local_mesh, COMM)
-    system = assemble(local_mesh, COMM, layout)
-    linear = LinearSolver("auto", layout)
-    assert linear.method == "multifrontal"
-    inverse = linear.inverse(system, shift)
-    assert inverse.negative == linear.count_below(system, shift) == 12
-    block = np.random.default_rng(COMM.rank).standard_normal((len(system.rigid), 5))
-    found = inverse.solve(block)
-    residual = system.times_stiffness(found) - shift * system.times_mass(found) - block
-    assert np.abs(residual).max() < 1e-10
-    inverse.destroy()
+    system, linear = assemble(local_mesh, COMM, layout), LinearSolver("multifrontal", layout)
+    tree = linear.tree
+    with pytest.MonkeyPatch.context() as patch:
+        if COMM.rank == COMM.size - 1:
+            patch.setattr(rank_tree, "available_memory", lambda: 0)
+        with pytest.raises(ConvergenceError, match="factorisation of 1,260 unknowns takes about"):
+            tree.inverse(system, -1.0)
+    system.rows.stiffness[:] = 0.0
+    with pytest.raises(ConvergenceError, match="singular to rounding"):
+        tree.inverse(system, 0.0)
+    for front in tree.fronts[-1:]:
+        data = np.zeros(front.strips.size)
+        assert SharedFactor(front, data).failed
 
 
 def mumps_solves_and_counts_what_the_own_factorisation_does() -> None:
-    """On one rank when asked for, on several as those of several machines."""
     model = solids.random_box(9, 6, 5)
     values = solids.dense_eigenvalues(model)
     local_mesh = distribute(on_first(model), PARTS, comm=COMM)
     layout = Layout.of_local_mesh(local_mesh, COMM)
     system = assemble(local_mesh, COMM, layout)
     own = LinearSolver("multifrontal", layout)
-    with on_machines_of_their_own():
-        other = LinearSolver("auto" if COMM.size > 1 else "mumps", layout)
-    assert other.method == "mumps"
+    other = LinearSolver("mumps", layout)
     block = np.random.default_rng(COMM.rank).standard_normal((len(system.rigid), 5))
     between = [(n, 0.5 * (values[n - 1] + values[n])) for n in (6, 12, 40, len(values) // 2)]
     for below, shift in [(0, -0.1 * values[6]), *between, (len(values), 1.1 * values[-1])]:
@@ -472,33 +491,13 @@ def modes_of_several_machines_are_those_of_one() -> None:
         with on_machines_of_their_own():
             found = modal_analysis(on_first(model), options, COMM)
         assert np.abs(found.values[6:] / exact - 1.0).max() < 1e-8, method
+        if method != "slepc":
+            together = modal_analysis(on_first(model), options, COMM)
+            assert (found.values == together.values).all(), method
+            assert (found.vectors == together.vectors).all(), method
         evidence = found.evidence
         assert evidence["inertia_count"] == evidence["inertia_expected"] >= 30, method
-        assert evidence.get("linear_solver", "mumps") == "mumps" or COMM.size == 1
-
-
-def the_own_factorisation_is_refused_on_several_machines() -> None:
-    local_mesh = distribute(on_first(solids.random_box(4, 3, 2)), COMM.size, comm=COMM)
-    layout = Layout.of_local_mesh(local_mesh, COMM)
-    with (
-        on_machines_of_their_own(),
-        pytest.raises(UserError, match="multifrontal runs on one machine"),
-    ):
-        LinearSolver("multifrontal", layout)
-
-
-def others_sleep_while_one_works_alone() -> None:
-    local_mesh = distribute(on_first(solids.random_box(4, 3, 2)), COMM.size, comm=COMM)
-    leader = LinearSolver("multifrontal", Layout.of_local_mesh(local_mesh, COMM)).leader
-    begin = time.process_time()
-    assert leader.alone(lambda: time.sleep(1.0)) is None
-    assert time.process_time() - begin < 0.5
-
-    def fail() -> None:
-        raise UserError("as it should")
-
-    with pytest.raises(UserError, match="^as it should$"):
-        leader.alone(fail)
+        assert method == "slepc" or evidence["linear_solver"] == "multifrontal", method
 
 
 def repetitions_give_the_same_bits() -> None:

@@ -4,9 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from numpy.testing import assert_allclose
 
-from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import read_modes
 from tests import slurm_cluster, workflow_runs
 from tests.programs import CHECKOUT, checkout_environment, python
@@ -167,13 +165,7 @@ def test_a_run_on_three_nodes_finds_the_same_bits_as_a_local_run(local, remote):
     folder, jobs = remote
     # Two cores of each rank fill a node: two trees and their leaves; and two runs of the solver.
     assert [job["NodeList"] for job in jobs].count("n[1-3]") == 5
-    for file in (*DATASET, MODEL, UNCORRECTED):
+    for file in (*DATASET, MODEL, UNCORRECTED, MODES):
         assert digest(folder / file) == digest(local / file), file
-
-
-def test_ranks_of_three_nodes_find_the_same_modes_but_for_what_mumps_leaves_open(local, remote):
-    """It adds in the order of arrival: docs/reproducibility.md."""
-    found, expected = (read_modes(str(folder / MODES)) for folder in (remote[0], local))
-    elastic = slice(RIGID_MODES, None)
-    assert_allclose(found.eigenvalues[elastic], expected.eigenvalues[elastic], rtol=1e-10)
-    assert found.attributes["ranks"] == expected.attributes["ranks"] == RANKS
+    for each in (folder, local):
+        assert read_modes(str(each / MODES)).attributes["ranks"] == RANKS

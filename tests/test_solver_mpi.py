@@ -24,19 +24,17 @@ def truth(tmp_path_factory, run_cli) -> Path:
     return path
 
 
-@pytest.mark.parametrize("ranks", SEVERAL)
-def test_one_rank_factorises_for_its_machine(ranks, mpiexec):
-    names = "one_rank_factorises_for_all,others_sleep_while_one_works_alone"
+@pytest.mark.parametrize("ranks", [*TO_THREE, 5])
+def test_ranks_factorise_together(ranks, mpiexec):
+    names = "all_ranks_factorise,a_rank_that_fails_to_factorise_ends_all"
     mpiexec(ranks, PROGRAM, names, check=True)
 
 
 @pytest.mark.parametrize("ranks", TO_THREE)
 def test_ranks_of_several_machines_solve_count_and_prove_as_those_of_one(ranks, mpiexec):
-    several = ["the_own_factorisation_is_refused_on_several_machines"] if ranks > 1 else []
     names = [
         "mumps_solves_and_counts_what_the_own_factorisation_does",
         "modes_of_several_machines_are_those_of_one",
-        *several,
     ]
     mpiexec(ranks, PROGRAM, ",".join(names), check=True)
 
@@ -116,13 +114,17 @@ def test_failure_of_one_rank_ends_the_others(tmp_path, mpiexec):
     program.write_text(
         "import sys\n"
         "from mpi4py import MPI\n"
-        "from solver.linear import multifrontal\n"
+        "from carillon.errors import LocalConvergenceError\n"
+        "from solver.hcms import local\n"
         "from solver.__main__ import main\n"
+        "def fail(*_):\n"
+        "    raise LocalConvergenceError('the modes of a subdomain did not converge')\n"
         "if MPI.COMM_WORLD.rank == 1:\n"
-        "    multifrontal.available_memory = lambda: 0\n"
-        f"sys.exit(main(['modes', *{MODEL!r}, '--modes', '30', '--out', 'x.h5']))\n"
+        "    local.lowest_modes = fail\n"
+        f"options = [*{MODEL!r}, '--method', 'hcms', '--modes', '30', '--out', 'x.h5']\n"
+        "sys.exit(main(['modes', *options]))\n"
     )
     done = mpiexec(3, program, timeout=HANG_SECONDS, cwd=tmp_path)
     assert done.returncode != 0
-    assert "solver modes: the sparse factorisation of" in done.stderr
+    assert "solver modes: the modes of a subdomain did not converge" in done.stderr
     assert not (tmp_path / "x.h5").exists()

@@ -10,7 +10,6 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry import blocks_from_mesh, builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, fine_model
-from solver import linear
 from solver.analysis.coarse_start import coarse_start
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
@@ -20,7 +19,7 @@ from solver.correction.lanczos import mixed
 from solver.correction.lobpcg import lobpcg
 from solver.correction.shift import LEAST, MOST, inverse_amid
 from solver.distribution.local_mesh import distribute
-from solver.linear import LinearSolver
+from solver.linear import LinearSolver, rank_tree
 from solver.linear.factorisation import count_negative
 from solver.subspace.basis import BlockBasis
 from solver.subspace.start import start_block
@@ -163,7 +162,7 @@ def test_blocks_of_a_basis_are_one_matrix(box, threads, columns):
 
 
 def test_what_no_memory_holds_is_left_to_multigrid(box, monkeypatch):
-    monkeypatch.setattr(linear, "available_memory", lambda: 1000)
+    monkeypatch.setattr(rank_tree, "available_memory", lambda: 1000)
     found = solids.analysed(box.model, modes=26, tolerance=1e-4)
     assert (found.evidence["method"], found.evidence["linear_solver"]) == ("lobpcg", "amg-cg")
     assert np.abs(found.values[RIGID_MODES:] / box.exact[:20] - 1.0).max() <= 1e-4

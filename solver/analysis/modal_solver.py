@@ -73,8 +73,13 @@ class ModalSolver:
             prepared = None
         with phases("partition"):
             if prepared is None:
-                subdomains = comm.size if options.method in RANDOM else options.subdomains
-                self.local_mesh = distribute(model, subdomains, options.seed, comm)
+                self.local_mesh = distribute(
+                    model,
+                    options.subdomains,
+                    options.seed,
+                    comm,
+                    by_planes=options.method in RANDOM,
+                )
             else:
                 self.local_mesh = prepared.local_mesh
         with phases("analysis"):
@@ -218,7 +223,7 @@ class Prepared:
     @classmethod
     def of_model(cls, model: Solid | None, comm: MPI.Comm) -> Prepared:
         """Prepare a model, which is None except on rank 0; collective."""
-        return cls.of_mesh(distribute(model, comm.size, comm=comm), comm)
+        return cls.of_mesh(distribute(model, comm=comm, by_planes=True), comm)
 
     @classmethod
     def of_mesh(

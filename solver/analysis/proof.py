@@ -75,7 +75,7 @@ def completed(
     `count` counts the eigenvalues below a value; MUMPS does where it is None.
     """
     inertia = None
-    if can_count():
+    if count is not None or can_count():
         with phases("inertia"):
             inertia = count_beyond(system, truth, count)
     if inertia is None or inertia.counted != inertia.computed:

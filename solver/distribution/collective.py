@@ -50,6 +50,25 @@ def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     return result
 
 
+def on_every_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T:
+    """Call `compute` on every rank, each of which keeps its result.
+
+    Where some fail, every rank raises the exception of the first of them.
+    """
+    result, failure = None, None
+    try:
+        result = compute()
+    except Exception as error:
+        if comm.size > 1:
+            error.collective = True  # type: ignore[attr-defined]
+        failure = error
+    if comm.size > 1:
+        failure = next(filter(None, comm.allgather(failure)), None)
+    if failure is not None:
+        raise failure
+    return cast(T, result)
+
+
 def optional(comm: MPI.Comm, warning: str, compute: Callable[[], T]) -> T | None:
     """Result of what is not needed for the main one; None, and a warning, where it fails.
 
@@ -81,6 +100,15 @@ def ranks_of_machine(comm: MPI.Comm) -> int:
     machine = machine_of(comm)
     try:
         return int(machine.size)
+    finally:
+        machine.Free()
+
+
+def sum_over_machine(comm: MPI.Comm, number: int) -> int:
+    """Sum of what each rank of this machine passes; collective."""
+    machine = machine_of(comm)
+    try:
+        return int(machine.allreduce(number))
     finally:
         machine.Free()
 

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Index
 from carillon.fem.model import Solid
+from solver.distribution.halves import cut_by_planes
 from solver.distribution.partition import default_subdomains, partition_model
-from solver.distribution.tree import MergeTree, assign_ranks, build_tree
+from solver.distribution.tree import MergeTree, assign_ranks, build_tree, tree_of_halves
 
 COST_EXPONENT = 1.5
 """Work on a subdomain grows like this power of its unknowns: so many modes of so many unknowns."""
@@ -69,6 +70,21 @@ def decompose(
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     owner = assign_ranks(sizes.astype(float) ** COST_EXPONENT, ranks)
     return Decomposition(tree, owner, offsets), order
+
+
+def decompose_by_planes(model: Solid, ranks: int) -> tuple[Decomposition, Index]:
+    """Cut a solid into one subdomain a rank, of equal work, by planes of its lattice.
+
+    Few nodes lie in the planes: what is left to the ranks together is little.  Returns what
+    `decompose` does. Raises UserError if there are more ranks than nodes.
+    """
+    lattice = np.rint((model.mesh.nodes - model.mesh.origin) / model.elements.edge)
+    steps = model.elements.steps
+    node_part = cut_by_planes(lattice.astype(np.int64), ranks, steps)
+    order = np.argsort(node_part, kind="stable").astype(np.int64)
+    sizes = np.bincount(node_part, minlength=ranks)
+    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    return Decomposition(tree_of_halves(ranks), np.arange(ranks, dtype=np.int32), offsets), order
 
 
 def _partition(model: Solid, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:

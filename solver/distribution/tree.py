@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
+from solver.distribution.rank_groups import groups_of
 
 LIGHTEST = 0.4
 """Least share of the nodes of two partners in the lighter one."""
@@ -102,6 +103,23 @@ def build_tree(
     renumbered = np.empty(parts, dtype=np.int32)
     renumbered[leaves] = np.arange(parts, dtype=np.int32)
     return MergeTree(parts, tuple(merges)), renumbered
+
+
+def tree_of_halves(parts: int) -> MergeTree:
+    """Merge tree that halves the subdomains as `groups_of` halves the ranks.
+
+    Examples
+    --------
+    >>> tree_of_halves(3).merges
+    (Merge(group=3, left=0, right=1), Merge(group=4, left=3, right=2))
+    """
+    number = {(part, part + 1): part for part in range(parts)}
+    merges = []
+    for group in groups_of(0, parts):
+        first, middle, stop = group.first, group.middle, group.stop
+        number[first, stop] = len(number)
+        merges.append(Merge(number[first, stop], number[first, middle], number[middle, stop]))
+    return MergeTree(parts, tuple(merges))
 
 
 class _Branch:

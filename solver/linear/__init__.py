@@ -10,21 +10,14 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
-from carillon.processes.memory import available_memory
-from solver.distribution.collective import bcast_from_root, ranks_of_machine
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
     from solver.linear.iterative import IterativeInverse
-    from solver.linear.leader import Leader
-    from solver.linear.plan import Plan
+    from solver.linear.rank_tree import RankTree
 
 METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
 ITERATIVE = ("icc-pcg", "amg-cg")
-LARGEST_SHARED = 500_000
-"""Unknowns up to which `auto` factorises on several ranks."""
-MOST_LED = 8
-"""Ranks of one machine up to which `auto` has one of them factorise, with threads, for all."""
 MEMORY_SHARE = 0.8
 """Share of the free memory that a factorisation may take."""
 
@@ -117,64 +110,37 @@ class Approximate:
 class LinearSolver:
     """Makes inverses of one mesh for any material and shift.
 
-    What depends on the mesh alone is computed once, here. Raises UserError for an unknown method,
-    or `multifrontal` on ranks of several machines.
+    What depends on the mesh alone is computed once, here. Raises UserError for an unknown method.
 
     Parameters
     ----------
     method
-        `multifrontal`: sparse factorisation by blocks, on the ranks of one machine.  `mumps`: the
-        same by MUMPS, on any number of ranks.  `icc-pcg`: conjugate gradients with incomplete
-        Cholesky, the paper's.  `amg-cg`: conjugate gradients with algebraic multigrid, for models
-        too large to factorise.  `auto`: the fastest direct one that the memory holds, or else
-        `amg-cg`.
+        `multifrontal`: sparse factorisation by blocks.  `mumps`: the same by MUMPS.  `icc-pcg`:
+        conjugate gradients with incomplete Cholesky, the paper's.  `amg-cg`: conjugate gradients
+        with algebraic multigrid, for models too large to factorise.  `auto`: `multifrontal` if the
+        memory of all machines holds it, or else `amg-cg`.
     """
 
     def __init__(self, method: str, layout: Layout) -> None:
         self._layout = layout
-        self._together = ranks_of_machine(layout.comm) == layout.comm.size
-        _require_method(method, self._together)
-        if method == "auto" and self._together and layout.comm.size <= MOST_LED:
-            method = "multifrontal" if self._fits() else "amg-cg"
-        elif method == "auto":
-            small = layout.local_mesh.n_dofs <= LARGEST_SHARED
-            method = "mumps" if small else "amg-cg"
+        _require_method(method)
+        if method == "auto":
+            method = "multifrontal" if self.tree.fits(MEMORY_SHARE) else "amg-cg"
         self.method = method
         if method == "multifrontal":
             # What depends on the mesh alone.
-            self.leader  # noqa: B018
+            self.tree  # noqa: B018
 
     @cached_property
-    def leader(self) -> Leader:
-        """Rank that factorises for all of a machine; made when first asked for, collective."""
-        from solver.linear.leader import Leader
+    def tree(self) -> RankTree:
+        """Elimination by all ranks; made when first asked for, collective."""
+        from solver.linear.rank_tree import RankTree
 
-        return Leader(self._layout)
-
-    @property
-    def plan(self) -> Plan:
-        """Elimination of all rows, which rank 0 has."""
-        return self.leader.whole_plan
-
-    def _fits(self) -> bool:
-        leader = self.leader
-
-        def fits() -> bool:
-            available = available_memory()
-            return available is None or leader.whole_plan.bytes < MEMORY_SHARE * available
-
-        return bcast_from_root(self._layout.comm, fits)
+        return RankTree(self._layout)
 
     def count_below(self, system: System, value: float) -> int:
-        """Eigenvalues of K - value M below zero, by inertia; collective.
-
-        Ranks of several machines need MUMPS for it: raises UserError where PETSc has none.
-        """
-        if self._together:
-            return self.leader.count_below(system, value)
-        from solver.linear.factorisation import count_negative
-
-        return count_negative(system.K, system.M, value)
+        """Eigenvalues of K - value M below zero, by inertia; collective."""
+        return self.tree.count_below(system, value)
 
     @property
     def indefinite(self) -> bool:
@@ -190,7 +156,7 @@ class LinearSolver:
     def inverse(self, system: System, shift: float) -> Inverse:
         """Inverse of K - shift M; the shift is negative for an iterative method."""
         if self.method == "multifrontal":
-            inverse = self.leader.inverse(system, shift)
+            inverse = self.tree.inverse(system, shift)
             alone = system.comm.size == 1
             return Lasting(inverse, system.rows.stiffness_diagonal) if alone else inverse
         if self.method == "mumps":
@@ -201,12 +167,6 @@ class LinearSolver:
 
 
 @on_all_ranks()
-def _require_method(method: str, together: bool) -> None:
-    """Refuse a method that is none, or runs only where the ranks are together on one machine."""
+def _require_method(method: str) -> None:
     if method not in METHODS:
         raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
-    if method == "multifrontal" and not together:
-        raise UserError(
-            "the linear solver multifrontal runs on one machine, the ranks are on several; "
-            "use mumps"
-        )

@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Index
+from solver.distribution.planes import best_plane, divided
 from solver.linear import symbolic
 
 LEAF_NODES = 48
 """Number of nodes that are eliminated together instead of cut."""
-SHORTEST_SIDE = 0.2
-"""Least share of the nodes on either side of a cut, if there is such a cut."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +25,13 @@ class Fronts:
     """Elimination order and fronts of a symmetric matrix of 3x3 node blocks."""
 
     order: Index
-    """(n,) nodes in the order of elimination."""
+    """(n,) nodes in the order of elimination, those that are kept last."""
     first: Index
     """(fronts + 1,) first position eliminated by each front; children come before parents."""
     parent: Index
     """(fronts,) parent of each front, -1 for a root."""
     position: Index
-    """(n,) place of each node in `order`."""
+    """Place in `order` of each node of the graph; -1 for those that are not in it."""
     offset: Index
     beyond: Index
     """Positions, after the front's own, that each front is coupled to, in compressed form;
@@ -41,12 +39,28 @@ class Fronts:
 
     @classmethod
     def of_order(
-        cls, order: Index, first: Index, parent: Index, indptr: Index, indices: Index
+        cls,
+        order: Index,
+        first: Index,
+        parent: Index,
+        indptr: Index,
+        indices: Index,
+        kept: Index | None = None,
     ) -> Fronts:
-        """Fronts that eliminate the nodes of a graph, in compressed rows, in this order."""
-        position = np.empty_like(order)
+        """Fronts that eliminate the nodes of a graph, in compressed rows, in this order.
+
+        What they leave of the nodes `kept` goes to one more front, which eliminates nothing.
+        """
+        if kept is not None:
+            order = np.concatenate([order, kept])
+            first = np.append(first, first[-1])
+            parent = np.append(np.where(parent < 0, len(parent), parent), -1)
+        position = np.full(len(indptr) - 1, -1, dtype=np.int64)
         position[order] = np.arange(len(order))
         offset, beyond = symbolic.boundaries(indptr, indices, order, position, first, parent)
+        if kept is not None:
+            beyond = np.concatenate([beyond[: offset[-2]], np.arange(first[-1], len(order))])
+            offset[-1] = len(beyond)
         return cls(order, first, parent, position, offset, beyond)
 
     def __len__(self) -> int:
@@ -62,9 +76,22 @@ class Fronts:
         start, entries = symbolic.entries(indptr, indices, *tree)
         return np.split(entries, start[1:-1])
 
+    def kept_entries(self, indptr: Index, indices: Index) -> NDArray[np.int32]:
+        """Block entries (e, 3) among the nodes that are kept, see `entries`.
+
+        The diagonal and those to its right: of two nodes, the row of the earlier one counts.
+        """
+        kept = self.order[self.first[-1] :]
+        counts = indptr[kept + 1] - indptr[kept]
+        row = np.repeat(np.arange(len(kept)), counts)
+        starts = np.repeat(indptr[kept] - np.cumsum(counts) + counts, counts)
+        number = starts + np.arange(len(row))
+        column = self.position[indices[number]] - self.first[-1]
+        return np.stack([row, column, number], axis=1)[column >= row].astype(np.int32)
+
     def places(self) -> list[Index]:
         """Place of each front's boundary in its parent's front."""
-        places = symbolic.places(self.first, self.parent, self.offset, self.beyond)
+        places = symbolic.places(len(self.order), self.first, self.parent, self.offset, self.beyond)
         return np.split(places, self.offset[1:-1])
 
     @cached_property
@@ -82,7 +109,13 @@ class Fronts:
 
 
 def dissect(
-    lattice: Index, indptr: Index, indices: Index, steps: int = 1, leaf_nodes: int = LEAF_NODES
+    lattice: Index,
+    indptr: Index,
+    indices: Index,
+    steps: int = 1,
+    leaf_nodes: int = LEAF_NODES,
+    inside: Index | None = None,
+    kept: Index | None = None,
 ) -> Fronts:
     """Order the nodes and find the fronts.
 
@@ -96,24 +129,31 @@ def dissect(
         Planes of the lattice that far apart, from zero on, separate the elements between them.
     leaf_nodes
         Sets of at most this many nodes are not cut.
+    inside
+        Nodes to eliminate; all if not given.
+    kept
+        Nodes that are not eliminated, in the order in which others will.
     """
     owns: list[Index] = []
     parent: list[int] = []
-    _cut(lattice, np.arange(len(lattice)), steps, leaf_nodes, owns, parent)
-    order = np.concatenate(owns)
-    first = np.concatenate([[0], np.cumsum([len(own) for own in owns])])
-    return Fronts.of_order(order, first, np.array(parent, dtype=np.int64), indptr, indices)
+    inside = np.arange(len(lattice)) if inside is None else inside
+    if len(inside):
+        _cut(lattice, inside, steps, leaf_nodes, owns, parent)
+    order = np.concatenate([inside[:0], *owns])
+    first = np.concatenate([[0], np.cumsum([len(own) for own in owns], dtype=np.int64)])
+    above = np.array(parent, dtype=np.int64)
+    return Fronts.of_order(order, first, above, indptr, indices, kept)
 
 
 def _cut(
     lattice: Index, nodes: Index, steps: int, leaf_nodes: int, owns: list[Index], parent: list[int]
 ) -> int:
     """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
-    axis, value = _best_plane(lattice, nodes, steps) if len(nodes) > leaf_nodes else (-1, 0)
+    axis, value = best_plane(lattice, nodes, steps) if len(nodes) > leaf_nodes else (-1, 0)
     children = []
     own = nodes
     if axis >= 0:
-        own, *sides = _divided(lattice, nodes, axis, value)
+        own, *sides = divided(lattice, nodes, axis, value)
         for side in sides:
             children.append(_cut(lattice, side, steps, leaf_nodes, owns, parent))
     owns.append(own)
@@ -121,44 +161,3 @@ def _cut(
     for child in children:
         parent[child] = len(owns) - 1
     return len(owns) - 1
-
-
-@numba.njit(cache=True, nogil=True)
-def _best_plane(lattice, nodes, steps):  # type: ignore[no-untyped-def]
-    """Axis and coordinate of the plane with few nodes that leaves two sides of similar size.
-
-    Axis -1 if there is none.
-    """
-    best = (-1, 0)
-    lowest = np.inf
-    for axis in range(3):
-        start = stop = lattice[nodes[0], axis]
-        for node in nodes:
-            start, stop = min(start, lattice[node, axis]), max(stop, lattice[node, axis])
-        count = np.zeros(stop + 1 - start, dtype=np.int64)
-        for node in nodes:
-            count[lattice[node, axis] - start] += 1
-        # The best of all planes, and of those with enough nodes on either side.
-        costs, values = [np.inf, np.inf], [start, start]
-        below = 0
-        for plane in range(len(count)):
-            above = len(nodes) - below - count[plane]
-            smaller = min(below, above)
-            if smaller > 0 and (start + plane) % steps == 0:
-                cost = count[plane] / np.sqrt(below * above)
-                for kind, least in enumerate((0.0, SHORTEST_SIDE * len(nodes))):
-                    if smaller >= least and cost < costs[kind]:
-                        costs[kind], values[kind] = cost, start + plane
-            below += count[plane]
-        kind = 1 if costs[1] < np.inf else 0
-        if costs[kind] < lowest:
-            lowest = costs[kind]
-            best = (axis, values[kind])
-    return best
-
-
-@numba.njit(cache=True, nogil=True)
-def _divided(lattice, nodes, axis, value):  # type: ignore[no-untyped-def]
-    """Nodes on a plane, below it and above it, in their order."""
-    coordinate = lattice[nodes, axis]
-    return nodes[coordinate == value], nodes[coordinate < value], nodes[coordinate > value]

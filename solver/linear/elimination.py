@@ -25,11 +25,12 @@ def eliminate_fronts(
     shift: float,
     threads: int,
     kept: tuple[Array, Array] | None,
-) -> int:
-    """Eliminate all rows of K - shift M.
+) -> tuple[int, Array]:
+    """Eliminate the rows of K - shift M that the plan eliminates.
 
-    Returns how many eigenvalues of the pivots are negative. Raises LocalConvergenceError if the
-    shift is an eigenvalue to rounding.
+    Returns how many eigenvalues of the pivots are negative, and the matrix that is left of the
+    nodes that the plan keeps, packed as updates are. Raises LocalConvergenceError if the shift is
+    an eigenvalue to rounding.
 
     Parameters
     ----------
@@ -40,6 +41,7 @@ def eliminate_fronts(
     """
     updates: dict[int, Array] = {}
     own_rows, outside = plan.own_rows, plan.outside_rows
+    last = len(own_rows) - 1
 
     def eliminated(front: int, room: Array, threads: int = 1) -> int:
         n, b = int(own_rows[front]), int(outside[front])
@@ -57,6 +59,8 @@ def eliminate_fronts(
         inverses, negative = _eliminate_panels(own, pivots)
         if b:
             update = _update(own, inverses, coupling, threads)
+            if front == last and plan.kept:
+                _subtract_entries(update, b, plan.kept_entries, stiffness, mass, shift)
             for child in children:
                 _add_beyond(update, b, n // 3, plan.places[child], updates.pop(child))
             updates[front] = update
@@ -75,7 +79,9 @@ def eliminate_fronts(
     for part, below in zip(tree.parts, tree.children, strict=True):
         if below:
             negative += eliminated_part(part, threads)
-    return negative
+    rest = updates.pop(last) if plan.kept else np.empty(0)
+    np.negative(rest, out=rest)
+    return negative, rest
 
 
 def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], int]:
@@ -101,7 +107,7 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
         if start:
             rows -= scaled[:start, start:stop].T @ own[:start, start:]
         size = stop - start
-        inverse, below = _inverse(rows[:, :size])
+        inverse, below = inverse_of(rows[:, :size])
         inverses.append(inverse)
         negative += below
         later = scaled[start:stop, stop:]
@@ -114,7 +120,7 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
     return inverses, negative
 
 
-def _inverse(block: Array) -> tuple[Array, int]:
+def inverse_of(block: Array) -> tuple[Array, int]:
     """Inverse of a symmetric matrix, given its upper triangle, and its negative eigenvalues."""
     room = BLOCKED * len(block)
     factor, pivots, _ = la.lapack.dsytrf(np.array(block).T, lower=1, lwork=room, overwrite_a=1)
@@ -176,6 +182,17 @@ def _add_entries(matrix, entries, stiffness, mass, shift):  # type: ignore[no-un
             for j in range(3):
                 matrix[row + i, column + j] += stiffness[number, i, j]
             matrix[row + i, column + i] -= shift * mass[number]
+
+
+@compiled
+def _subtract_entries(packed, size, entries, stiffness, mass, shift):  # type: ignore[no-untyped-def]
+    for entry in range(entries.shape[0]):
+        row, column, number = 3 * entries[entry, 0], 3 * entries[entry, 1], entries[entry, 2]
+        for i in range(3):
+            target, first = _row(packed, size, row + i)
+            for j in range(3):
+                target[column + j - first] -= stiffness[number, i, j]
+            target[column + i - first] += shift * mass[number]
 
 
 @compiled

@@ -107,9 +107,16 @@ class Plan:
         (n, 3) integer coordinates of the nodes.
     indptr, indices
         Node graph in compressed rows; the data of `Factor` follow it.
+    options
+        Those of `dissect`.
 
     Attributes
     ----------
+    kept
+        Number of nodes that are not eliminated.
+    kept_entries
+        (e, 3) block entries among them: row and column, of which none is before the row, and
+        number in the data.
     own_rows, outside_rows
         (fronts,) unknowns that each front eliminates, and others that these are coupled to.
     bytes, bytes_of_updates
@@ -122,6 +129,8 @@ class Plan:
         self.fronts: Fronts = dissect(lattice, indptr, indices, **options)
         fronts = self.fronts
         self.position = fronts.position
+        self.kept = len(fronts.order) - int(fronts.first[-1])
+        self.kept_entries = fronts.kept_entries(indptr, indices)
         self.children = fronts.children()
         self.entries = fronts.entries(indptr, indices)
         self.places = fronts.places()

@@ -97,10 +97,13 @@ def entries(indptr, indices, order, position, first, offset, boundary):  # type:
 
 
 @numba.njit(cache=True, nogil=True)
-def places(first, parent, offset, boundary):  # type: ignore[no-untyped-def]
-    """Place of each front's `boundary` in its parent's front; in the whole order without one."""
+def places(size, first, parent, offset, boundary):  # type: ignore[no-untyped-def]
+    """Place of each front's `boundary` in its parent's front; in the whole order without one.
+
+    The order has `size` nodes.
+    """
     result = boundary.copy()
-    local = np.empty(first[-1], dtype=np.int64)
+    local = np.empty(size, dtype=np.int64)
     last, before = _children(parent)
     for front in range(len(parent)):
         if last[front] < 0:

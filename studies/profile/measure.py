@@ -188,7 +188,7 @@ def _replay(
     meter: _Meter,
 ) -> None:
     """The steps of a solve, each measured."""
-    rows, plan = len(start), linear.plan
+    rows, plan = len(start), linear.tree.plan
     with meter("factorisation", plan.operations, plan.bytes - plan.bytes_of_updates):
         inverse = linear.inverse(system, shift)
     measured = cast(System, _MeteredSystem(system, meter))

@@ -34,7 +34,7 @@ def test_phases_tell_their_work_and_what_the_machine_can_do(bar):
 
 
 def test_what_no_factorisation_fits_is_refused(bar, monkeypatch):
-    monkeypatch.setattr("solver.linear.available_memory", lambda: 1)
+    monkeypatch.setattr("solver.linear.rank_tree.available_memory", lambda: 1)
     assert ModalSolver(bar, SolverOptions(modes=24)).options.method == "lobpcg"
     with pytest.raises(UserError, match="too many to be factorised .* lower --resolution"):
         profile(bar, ProfileOptions(modes=24, runs=1))

@@ -55,7 +55,7 @@ class ScalingOptions:
     weak: bool = option(False, "also a solid that grows with the ranks, as many unknowns a rank")
     tolerance: Tolerance = option(INTERACTIVE_TOLERANCE, "relative eigenvalue error to correct to")
     linear_solver: Annotated[str, OneOf(*linear.METHODS)] = option(
-        "mumps",
+        "multifrontal",
         "linear solver of the correction, the same on any number of ranks",
     )
     latency: Annotated[float, between(1e-12, 1e3)] | None = option(

@@ -1,0 +1,137 @@
+"""Nodes of a lattice in halves of equal work, by planes through which few of them are cut.
+
+The work is that of eliminating each half by itself, which for equally many nodes is more where
+they lie in a compact body than where they lie in its ears.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.arrays import Index
+from carillon.errors import UserError
+from solver.distribution.planes import best_plane
+from solver.distribution.rank_groups import RankGroup, groups_of
+
+SLACK = 0.02
+"""Share of the nodes by which a half may miss its own, for a plane of fewer nodes."""
+TRIES = 6
+"""Cuts that are tried to share the work."""
+GROWTH = 2.0
+"""Exponent by which the ratio of the halves' work grows with that of their nodes, about."""
+EVEN = 0.03
+"""Difference of the halves' work from their share at which the search ends."""
+FEW = 500
+"""Nodes of a region that is not cut further to estimate its work."""
+
+
+def cut_by_planes(lattice: Index, parts: int, steps: int = 1) -> NDArray[np.int32]:
+    """Part (n,) of each node, by its integer coordinates (n, 3).
+
+    Parts are halves of halves, see `groups_of`, and have equal work, about. Raises UserError if
+    there are more parts than nodes.
+
+    Parameters
+    ----------
+    lattice, steps
+        See `solver.linear.dissection.dissect`.
+
+    Examples
+    --------
+    >>> cut_by_planes(np.array([[0, 0, 0], [3, 0, 0], [1, 0, 0], [2, 0, 0]]), 2)
+    array([0, 1, 0, 1], dtype=int32)
+    """
+    if parts > len(lattice):
+        raise UserError(
+            f"{parts} ranks for {len(lattice)} nodes: every rank needs one; start fewer ranks"
+        )
+    part = np.zeros(len(lattice), dtype=np.int32)
+    # A part is the number of its first rank until it is halved.
+    for group in reversed(list(groups_of(0, parts))):
+        nodes = np.flatnonzero(part == group.first)
+        part[nodes[_second_half(lattice[nodes], group, steps)]] = group.middle
+    return part
+
+
+def _second_half(lattice: Index, group: RankGroup, steps: int) -> Index:
+    """Nodes of the second half of a group's ranks."""
+    ranks = group.middle - group.first, group.stop - group.middle
+    best = tried = _beyond(lattice, ranks[0] / sum(ranks), ranks)
+    if len(lattice) <= 2 * FEW:
+        return best
+    # Logarithms of the ratio of the halves' nodes, and of their work for each rank.
+    low, high, least = (-np.inf, -np.inf), (np.inf, np.inf), np.inf
+    for _ in range(TRIES):
+        first = np.setdiff1d(np.arange(len(lattice)), tried)
+        halves = lattice[first], lattice[tried]
+        works = [elimination_work(*each, steps) for each in (halves, halves[::-1])]
+        here = np.log(len(first) / len(tried)), np.log(works[0] * ranks[1] / works[1] / ranks[0])
+        if abs(here[1]) < least:
+            best, least = tried, abs(here[1])
+        if least < EVEN:
+            break
+        if here[1] < 0.0:
+            low = max(low, here)
+        else:
+            high = min(high, here)
+        if np.isfinite(high[0] - low[0]):
+            odds = low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
+        else:
+            odds = here[0] - here[1] / GROWTH
+        tried = _beyond(lattice, 1.0 / (1.0 + np.exp(-odds)), ranks)
+    return best
+
+
+def _beyond(lattice: Index, share: float, fewest: tuple[int, int]) -> Index:
+    """Nodes of the second half, where the first has about this share of them.
+
+    A half has `fewest` nodes at least.
+    """
+    count = len(lattice)
+    exact = min(max(round(share * count), fewest[0]), count - fewest[1])
+    best = np.inf, np.arange(0)
+    for axis in range(3):
+        # Nodes of one plane are taken row by row.
+        order = np.lexsort([lattice[:, axis - 2], lattice[:, axis - 1], lattice[:, axis]])
+        _, first = np.unique(lattice[order, axis], return_index=True)
+        size = np.diff(np.append(first, count))
+        stop = exact
+        cost = float(size[int(np.searchsorted(first, exact, side="right")) - 1])
+        for number in np.flatnonzero(np.abs(first - share * count) <= SLACK * count):
+            fits = fewest[0] <= first[number] <= count - fewest[1]
+            # Between two planes either of them separates.
+            least = float(min(size[number], size[max(number - 1, 0)]))
+            if fits and least <= cost:
+                stop, cost = int(first[number]), least
+        if cost < best[0]:
+            best = cost, order[stop:]
+    return best[1]
+
+
+def elimination_work(lattice: Index, others: Index, steps: int = 1) -> float:
+    """Products of eliminating the nodes (n, 3) of a lattice, estimated from their dissection.
+
+    Those of the `others` (m, 3) that lie around them are eliminated later.
+    """
+    regions, work = [(lattice, _near(others, lattice, 1))], 0.0
+    while regions:
+        nodes, around = regions.pop()
+        beyond = 3.0 * len(around)
+        axis, value = best_plane(nodes, np.arange(len(nodes)), steps)
+        if len(nodes) <= FEW or axis < 0:
+            # As in a cube, whose plane has so many unknowns.
+            plane = 3.0 * len(nodes) ** (2.0 / 3.0)
+            work += 2.0 * plane**3 + plane * beyond**2
+            continue
+        own = nodes[nodes[:, axis] == value]
+        rows = 3.0 * len(own)
+        work += rows**3 / 3.0 + rows**2 * beyond + rows * beyond**2
+        near = np.concatenate([around, own])
+        for half in (nodes[nodes[:, axis] < value], nodes[nodes[:, axis] > value]):
+            regions.append((half, _near(near, half, steps)))
+    return work
+
+
+def _near(nodes: Index, others: Index, steps: int) -> Index:
+    """Those of the nodes that lie in the box of the `others`, or so many steps beside it."""
+    low, high = others.min(axis=0) - steps, others.max(axis=0) + steps
+    return nodes[((nodes >= low) & (nodes <= high)).all(axis=1)]
