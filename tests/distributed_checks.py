@@ -40,7 +40,7 @@ from solver.hcms.scalapack import grid_side, shared_pairs
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver, rank_tree
 from solver.linear.multigrid import Multigrid
-from solver.linear.shared_front import SharedFactor
+from solver.linear.shared_factor import SharedFactor
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from tests import cut_solids, solids
 

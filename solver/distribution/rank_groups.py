@@ -54,7 +54,9 @@ def communicator(comm: MPI.Comm, group: RankGroup) -> MPI.Comm:
         comm.Set_attr(_key(), {})
     known = cast(dict[RankGroup, MPI.Comm], comm.Get_attr(_key()))
     if group not in known:
-        members = comm.Get_group().Incl(list(range(group.first, group.stop)))
+        everyone = comm.Get_group()
+        members = everyone.Incl(list(range(group.first, group.stop)))
         known[group] = comm.Create_group(members)
         members.Free()
+        everyone.Free()
     return known[group]

@@ -2,7 +2,8 @@
 
 Every rank eliminates the inside of its rows by itself (`solver.linear.multifrontal`).  What is left
 of the nodes that separate the ranks is merged pairwise: the ranks of two halves share the front of
-the nodes between them (`solver.linear.shared_front`).  A solve goes up and down likewise.
+the nodes between them (`solver.linear.shared_front`, `shared_factor`).  A solve goes up and down
+likewise.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from solver.linear.elimination import eliminate_fronts
 from solver.linear.multifrontal import Factor
 from solver.linear.plan import STRIP, Plan
 from solver.linear.separators import Separators
-from solver.linear.shared_front import Child, SharedFactor, SharedFront, Strips, owners
+from solver.linear.shared_factor import SharedFactor
+from solver.linear.shared_front import Child, SharedFront, Strips, owners
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
