@@ -23,7 +23,7 @@ from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.geometry.hanging import WHOLE
 from carillon.fem.model import ElasticModel, Solid
-from solver.analysis.modal_solver import modal_analysis
+from solver.analysis.modal_solver import ModalSolver, modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.assembly.sparse import assembled
@@ -498,6 +498,18 @@ def modes_of_several_machines_are_those_of_one() -> None:
         evidence = found.evidence
         assert evidence["inertia_count"] == evidence["inertia_expected"] >= 30, method
         assert method == "slepc" or evidence["linear_solver"] == "multifrontal", method
+
+
+def a_warm_start_takes_the_inverse_of_the_material_before() -> None:
+    model = solids.random_box(10, 7, 6)
+    prepared = ModalSolver(on_first(model), SolverOptions(modes=36, tolerance=1e-3), COMM)
+    first = prepared.solve()
+    young = model.young * (1.0 + 0.1 * np.cos(0.3 * model.mesh.grid[:, 0]))[:, None]
+    warm = prepared.solve(young if COMM.rank == 0 else None, initial_modes=first)
+    exact = solids.dense_eigenvalues(model.with_young(young))[6:36]
+    assert np.abs(warm.values[6:] / exact - 1.0).max() <= 1e-3
+    assert warm.evidence["corrections"] == 1
+    assert warm.inverse is first.inverse is not None
 
 
 def repetitions_give_the_same_bits() -> None:

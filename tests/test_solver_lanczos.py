@@ -142,11 +142,9 @@ def test_an_inverse_is_scaled_to_a_similar_stiffness():
     similar = prepared.inverse(modes, shift)
     system, vectors = other.system, other.vectors
     mass_vectors = system.times_mass(vectors)
-    diagonal = system.rows.stiffness_diagonal
-    np.testing.assert_allclose(diagonal, 1.7 * modes.system.rows.stiffness_diagonal)
     block = np.random.default_rng(0).standard_normal((system.n_dofs, 3))
     block -= mass_vectors @ (vectors.T @ block)
-    found = Approximate(similar, diagonal, vectors, mass_vectors).solve(block)
+    found = Approximate(similar, system, vectors, mass_vectors).solve(block)
     expected = prepared.inverse(other, 1.7 * shift).solve(block)
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 

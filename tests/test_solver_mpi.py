@@ -26,8 +26,12 @@ def truth(tmp_path_factory, run_cli) -> Path:
 
 @pytest.mark.parametrize("ranks", [*TO_THREE, 5])
 def test_ranks_factorise_together(ranks, mpiexec):
-    names = "all_ranks_factorise,a_rank_that_fails_to_factorise_ends_all"
-    mpiexec(ranks, PROGRAM, names, check=True)
+    names = [
+        "all_ranks_factorise",
+        "a_rank_that_fails_to_factorise_ends_all",
+        "a_warm_start_takes_the_inverse_of_the_material_before",
+    ]
+    mpiexec(ranks, PROGRAM, ",".join(names), check=True)
 
 
 @pytest.mark.parametrize("ranks", TO_THREE)

@@ -202,8 +202,7 @@ class SubspaceIteration:
         near = step == 0 or self.history[-1] <= WORTH_INEXACT * tolerance
         if similar is not None and near and not self._too_high(similar):
             ritz = self.ritz
-            diagonal = self.system.rows.stiffness_diagonal
-            return Approximate(similar, diagonal, ritz.vectors, ritz.mass_vectors)
+            return Approximate(similar, self.system, ritz.vectors, ritz.mass_vectors)
         return self._exact_inverse()
 
     def _exact_inverse(self) -> Inverse:

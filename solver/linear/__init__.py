@@ -40,7 +40,7 @@ class Inverse(Protocol):
 
 
 class Lasting:
-    """An inverse on one rank to keep for similar materials: nothing but arrays, never to be freed.
+    """An inverse to keep for similar materials: nothing but arrays, never to be freed.
 
     Its `diagonal` (local unknowns,) is that of its stiffness [N/m].
     """
@@ -68,8 +68,8 @@ class Approximate:
     ----------
     similar
         Inverse for the other material.
-    diagonal
-        (local unknowns,) of the stiffness [N/m] here.
+    system
+        Stiffness and mass of the material here.
     vectors, mass_vectors
         (local, m) mass-orthonormal X that corrections need not lie in, and M X.
 
@@ -84,9 +84,10 @@ class Approximate:
     exact = False
 
     def __init__(
-        self, similar: Lasting, diagonal: Array, vectors: Array, mass_vectors: Array
+        self, similar: Lasting, system: System, vectors: Array, mass_vectors: Array
     ) -> None:
-        self._similar = similar
+        self._similar, self._system = similar, system
+        diagonal = system.rows.stiffness_diagonal
         self._vectors, self._mass_vectors = vectors, mass_vectors
         ratio = np.divide(
             similar.diagonal, diagonal, out=np.ones_like(diagonal), where=diagonal > 0
@@ -98,7 +99,7 @@ class Approximate:
     def solve(self, block: Array) -> Array:
         """Solutions of the similar system, scaled."""
         block = self._scale * block
-        block -= self._mass_vectors @ (self._vectors.T @ block)
+        block -= self._mass_vectors @ self._system.inner(self._vectors, block)
         solution = self._similar.solve(block)
         solution *= self._scale
         return solution
@@ -157,8 +158,7 @@ class LinearSolver:
         """Inverse of K - shift M; the shift is negative for an iterative method."""
         if self.method == "multifrontal":
             inverse = self.tree.inverse(system, shift)
-            alone = system.comm.size == 1
-            return Lasting(inverse, system.rows.stiffness_diagonal) if alone else inverse
+            return Lasting(inverse, system.rows.stiffness_diagonal)
         if self.method == "mumps":
             from solver.linear.factorisation import MumpsInverse
 
