@@ -5,6 +5,7 @@ Every rank makes the same checks, and one that fails ends them all.
 
 import os
 import sys
+import traceback
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,7 +39,8 @@ from solver.hcms.counts import Tally
 from solver.hcms.merge import Reduced, all_pairs
 from solver.hcms.scalapack import grid_side, shared_pairs
 from solver.hcms.synthesis import synthesize
-from solver.linear import LinearSolver, rank_tree
+from solver.linear import LinearSolver, multifrontal
+from solver.linear.factorisation import count_negative
 from solver.linear.multigrid import Multigrid
 from solver.linear.shared_factor import SharedFactor
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
@@ -420,7 +422,7 @@ def multigrid_is_the_same_bits_again() -> None:
 
 
 def all_ranks_factorise() -> None:
-    """As many subdomains as ranks, more than ranks, and a solid that the ranks cut in pieces."""
+    """One subdomain a rank, several, and a solid so thin that halves of the ranks hardly touch."""
     whole = solids.random_box(9, 6, 5)
     for model, by_planes in ((whole, True), (whole, False), (solids.random_box(17, 2, 1), True)):
         values = solids.dense_eigenvalues(model)
@@ -437,7 +439,7 @@ def all_ranks_factorise() -> None:
             assert inverse.negative == linear.count_below(system, shift) == below
             found = inverse.solve(block)
             residual = system.times_stiffness(found) - shift * system.times_mass(found) - block
-            assert np.abs(residual).max() < 1e-9
+            assert np.abs(residual).max() < (1e-10 if below == 12 else 1e-9)
             again = linear.inverse(system, shift)
             assert (again.solve(block) == found).all()
             assert (inverse.solve(block) == found).all()
@@ -451,7 +453,7 @@ def a_rank_that_fails_to_factorise_ends_all() -> None:
     tree = linear.tree
     with pytest.MonkeyPatch.context() as patch:
         if COMM.rank == COMM.size - 1:
-            patch.setattr(rank_tree, "available_memory", lambda: 0)
+            patch.setattr(multifrontal, "available_memory", lambda: 0)
         with pytest.raises(ConvergenceError, match="factorisation of 1,260 unknowns takes about"):
             tree.inverse(system, -1.0)
     system.rows.stiffness[:] = 0.0
@@ -477,6 +479,7 @@ def mumps_solves_and_counts_what_the_own_factorisation_does() -> None:
         for linear in (own, other):
             inverse = linear.inverse(system, shift)
             assert inverse.negative == linear.count_below(system, shift) == below
+            assert count_negative(system.K, system.M, shift) == below
             found.append(inverse.solve(block))
             inverse.destroy()
         largest = COMM.allreduce(float(np.abs(found[0]).max()), MPI.MAX)
@@ -549,4 +552,9 @@ if __name__ == "__main__":
     for name in sys.argv[1].split(","):
         if COMM.rank == 0:
             print(name, flush=True)  # tells which one failed
-        globals()[name](*map(Path, sys.argv[2:]))
+        try:
+            globals()[name](*map(Path, sys.argv[2:]))
+        except BaseException:
+            # PETSc's end is collective: without this, the others would wait for it for ever.
+            traceback.print_exc()
+            COMM.Abort(1)

@@ -142,6 +142,8 @@ def test_an_inverse_is_scaled_to_a_similar_stiffness():
     similar = prepared.inverse(modes, shift)
     system, vectors = other.system, other.vectors
     mass_vectors = system.times_mass(vectors)
+    diagonal = system.rows.stiffness_diagonal
+    np.testing.assert_allclose(diagonal, 1.7 * modes.system.rows.stiffness_diagonal)
     block = np.random.default_rng(0).standard_normal((system.n_dofs, 3))
     block -= mass_vectors @ (vectors.T @ block)
     found = Approximate(similar, system, vectors, mass_vectors).solve(block)

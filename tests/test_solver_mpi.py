@@ -118,6 +118,23 @@ def test_failure_of_one_rank_ends_the_others(tmp_path, mpiexec):
     program.write_text(
         "import sys\n"
         "from mpi4py import MPI\n"
+        "from solver.linear import multifrontal\n"
+        "from solver.__main__ import main\n"
+        "if MPI.COMM_WORLD.rank == 1:\n"
+        "    multifrontal.available_memory = lambda: 0\n"
+        f"sys.exit(main(['modes', *{MODEL!r}, '--modes', '30', '--out', 'x.h5']))\n"
+    )
+    done = mpiexec(3, program, timeout=HANG_SECONDS, cwd=tmp_path)
+    assert done.returncode != 0
+    assert "solver modes: the sparse factorisation of" in done.stderr
+    assert not (tmp_path / "x.h5").exists()
+
+
+def test_failure_that_only_one_rank_knows_of_ends_the_others(tmp_path, mpiexec):
+    program = tmp_path / "one_fails.py"
+    program.write_text(
+        "import sys\n"
+        "from mpi4py import MPI\n"
         "from carillon.errors import LocalConvergenceError\n"
         "from solver.hcms import local\n"
         "from solver.__main__ import main\n"

@@ -8,9 +8,7 @@ from scipy.sparse.linalg import splu
 from carillon.errors import ConvergenceError
 from carillon.fem.model import fine_model
 from solver.assembly.node_rows import NodeRows, Pattern
-from solver.assembly.system import Layout, assemble
-from solver.distribution.local_mesh import distribute
-from solver.linear import LinearSolver, rank_tree
+from solver.linear import multifrontal
 from solver.linear.multifrontal import Factor
 from solver.linear.plan import Plan
 from tests import solids
@@ -104,11 +102,9 @@ def test_dissection_saves_work():
 
 
 def test_a_factorisation_that_does_not_fit_is_refused(monkeypatch):
-    local_mesh = distribute(solids.random_box(7, 5, 4), by_planes=True)
-    layout = Layout.of_local_mesh(local_mesh)
-    system, linear = assemble(local_mesh, layout=layout), LinearSolver("multifrontal", layout)
-    monkeypatch.setattr(rank_tree, "available_memory", lambda: linear.tree.bytes - 1)
+    rows, plan, _ = problem(solids.box_mesh(7, 5, 4))
+    monkeypatch.setattr(multifrontal, "available_memory", lambda: plan.bytes - 1)
     with pytest.raises(ConvergenceError, match="factorisation of 720 unknowns takes about .* free"):
-        linear.inverse(system, -1.0)
-    monkeypatch.setattr(rank_tree, "available_memory", lambda: None)
-    linear.inverse(system, -1.0)
+        Factor(plan, rows.stiffness, rows.mass, -1.0)
+    monkeypatch.setattr(multifrontal, "available_memory", lambda: None)
+    Factor(plan, rows.stiffness, rows.mass, -1.0)

@@ -144,7 +144,7 @@ def flip(content: bytearray) -> None:
 
 
 def test_damaged_files_are_named_and_nothing_comes_of_them(folder, assert_as_undisturbed):
-    """What a shard's description would change waits for it: the shard is asked for last."""
+    """The shard is asked for last, since its missing description keeps back whatever needs it."""
     damaged = {
         FORESTS: (flip, "results/forests/forests.json"),
         TRUTH: (cut, "results/models/bar/convergence.json"),

@@ -32,7 +32,7 @@ _FIELDS = 2 + MOST_DIMENSIONS
 
 def bcast_from_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     """Call `compute` on rank 0 and give every rank its result, or its exception."""
-    result, failure = _attempt(comm, compute)
+    result, failure = _attempt_on_root(comm, compute)
     if comm.size > 1:
         result, failure = comm.bcast((result, failure), root=0)
     if failure is not None:
@@ -43,7 +43,7 @@ def bcast_from_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
 
 def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     """Call `compute` on rank 0, which keeps the result; its exception is raised on every rank."""
-    result, failure = _attempt(comm, compute)
+    result, failure = _attempt_on_root(comm, compute)
     failure = comm.bcast(failure, root=0)
     if failure is not None:
         raise failure
@@ -55,13 +55,7 @@ def on_every_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T:
 
     Where some fail, every rank raises the exception of the first of them.
     """
-    result, failure = None, None
-    try:
-        result = compute()
-    except Exception as error:
-        if comm.size > 1:
-            error.collective = True  # type: ignore[attr-defined]
-        failure = error
+    result, failure = _attempt(comm, compute)
     if comm.size > 1:
         failure = next(filter(None, comm.allgather(failure)), None)
     if failure is not None:
@@ -97,11 +91,7 @@ def machine_of(comm: MPI.Comm) -> MPI.Comm:
 
 def ranks_of_machine(comm: MPI.Comm) -> int:
     """How many of the ranks have the memory of this one; collective."""
-    machine = machine_of(comm)
-    try:
-        return int(machine.size)
-    finally:
-        machine.Free()
+    return sum_over_machine(comm, 1)
 
 
 def sum_over_machine(comm: MPI.Comm, number: int) -> int:
@@ -138,16 +128,19 @@ def gather_rows(comm: MPI.Comm, part: NDArray[Number]) -> NDArray[Number] | None
     return whole
 
 
+def _attempt_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:
+    """See `_attempt`; nothing on the other ranks."""
+    return _attempt(comm, compute) if comm.rank == 0 else (None, None)
+
+
 def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Exception | None]:
-    """Result of `compute` on rank 0, or the exception, marked as one that all ranks will raise."""
-    if comm.rank == 0:
-        try:
-            return compute(), None
-        except Exception as error:
-            if comm.size > 1:  # else others may be at work that do not know
-                error.collective = True  # type: ignore[attr-defined]
-            return None, error
-    return None, None
+    """Result of `compute`, or the exception, marked as one that all ranks will raise."""
+    try:
+        return compute(), None
+    except Exception as error:
+        if comm.size > 1:  # else others may be at work that do not know
+            error.collective = True  # type: ignore[attr-defined]
+        return None, error
 
 
 @dataclass

@@ -9,6 +9,7 @@ from carillon.arrays import Index
 from carillon.fem.model import Solid
 from solver.distribution.halves import cut_by_planes
 from solver.distribution.partition import default_subdomains, partition_model
+from solver.distribution.planes import lattice_of
 from solver.distribution.tree import MergeTree, assign_ranks, build_tree, tree_of_halves
 
 COST_EXPONENT = 1.5
@@ -64,11 +65,8 @@ def decompose(
     """
     node_part = _partition(model, subdomains, seed, ranks)
     tree, renumbered = build_tree(node_part[model.connectivity], np.bincount(node_part))
-    node_part = renumbered[node_part]
-    order = np.argsort(node_part, kind="stable").astype(np.int64)
-    sizes = np.bincount(node_part, minlength=tree.parts)
-    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    owner = assign_ranks(sizes.astype(float) ** COST_EXPONENT, ranks)
+    order, offsets = _rows(renumbered[node_part], tree.parts)
+    owner = assign_ranks(np.diff(offsets).astype(float) ** COST_EXPONENT, ranks)
     return Decomposition(tree, owner, offsets), order
 
 
@@ -78,13 +76,17 @@ def decompose_by_planes(model: Solid, ranks: int) -> tuple[Decomposition, Index]
     Few nodes lie in the planes: what is left to the ranks together is little.  Returns what
     `decompose` does. Raises UserError if there are more ranks than nodes.
     """
-    lattice = np.rint((model.mesh.nodes - model.mesh.origin) / model.elements.edge)
-    steps = model.elements.steps
-    node_part = cut_by_planes(lattice.astype(np.int64), ranks, steps)
-    order = np.argsort(node_part, kind="stable").astype(np.int64)
-    sizes = np.bincount(node_part, minlength=ranks)
-    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    mesh, elements = model.mesh, model.elements
+    lattice = lattice_of(mesh.nodes, mesh.origin, elements.edge)
+    order, offsets = _rows(cut_by_planes(lattice, ranks, elements.steps), ranks)
     return Decomposition(tree_of_halves(ranks), np.arange(ranks, dtype=np.int32), offsets), order
+
+
+def _rows(node_part: NDArray[np.int32], parts: int) -> tuple[Index, Index]:
+    """Nodes (n,) by subdomain, then by number, and the first row (parts + 1,) of each subdomain."""
+    sizes = np.bincount(node_part, minlength=parts)
+    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    return np.argsort(node_part, kind="stable").astype(np.int64), offsets
 
 
 def _partition(model: Solid, subdomains: int | None, seed: int, ranks: int) -> NDArray[np.int32]:

@@ -4,6 +4,10 @@ The work is that of eliminating each half by itself, which for equally many node
 they lie in a compact body than where they lie in its ears.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,7 +59,8 @@ def cut_by_planes(lattice: Index, parts: int, steps: int = 1) -> NDArray[np.int3
 def _second_half(lattice: Index, group: RankGroup, steps: int) -> Index:
     """Nodes of the second half of a group's ranks."""
     ranks = group.middle - group.first, group.stop - group.middle
-    best = tried = _beyond(lattice, ranks[0] / sum(ranks), ranks)
+    axes = [_Axis.of(lattice, axis) for axis in range(3)]
+    best = tried = _beyond(axes, ranks[0] / sum(ranks), ranks)
     if len(lattice) <= 2 * FEW:
         return best
     # Logarithms of the ratio of the halves' nodes, and of their work for each rank.
@@ -77,24 +82,37 @@ def _second_half(lattice: Index, group: RankGroup, steps: int) -> Index:
             odds = low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
         else:
             odds = here[0] - here[1] / GROWTH
-        tried = _beyond(lattice, 1.0 / (1.0 + np.exp(-odds)), ranks)
+        tried = _beyond(axes, 1.0 / (1.0 + np.exp(-odds)), ranks)
     return best
 
 
-def _beyond(lattice: Index, share: float, fewest: tuple[int, int]) -> Index:
+@dataclass(frozen=True)
+class _Axis:
+    """Nodes in the order of one axis, those of one plane row by row."""
+
+    order: Index
+    first: Index
+    """Place in the order of each plane's first node."""
+    size: Index
+    """Number of nodes in each plane."""
+
+    @classmethod
+    def of(cls, lattice: Index, axis: int) -> _Axis:
+        order = np.lexsort([lattice[:, axis - 2], lattice[:, axis - 1], lattice[:, axis]])
+        _, first, size = np.unique(lattice[order, axis], return_index=True, return_counts=True)
+        return cls(order, first, size)
+
+
+def _beyond(axes: list[_Axis], share: float, fewest: tuple[int, int]) -> Index:
     """Nodes of the second half, where the first has about this share of them.
 
     A half has `fewest` nodes at least.
     """
-    count = len(lattice)
+    count = len(axes[0].order)
     exact = min(max(round(share * count), fewest[0]), count - fewest[1])
     best = np.inf, np.arange(0)
-    for axis in range(3):
-        # Nodes of one plane are taken row by row.
-        order = np.lexsort([lattice[:, axis - 2], lattice[:, axis - 1], lattice[:, axis]])
-        _, first = np.unique(lattice[order, axis], return_index=True)
-        size = np.diff(np.append(first, count))
-        stop = exact
+    for axis in axes:
+        first, size, stop = axis.first, axis.size, exact
         cost = float(size[int(np.searchsorted(first, exact, side="right")) - 1])
         for number in np.flatnonzero(np.abs(first - share * count) <= SLACK * count):
             fits = fewest[0] <= first[number] <= count - fewest[1]
@@ -103,7 +121,7 @@ def _beyond(lattice: Index, share: float, fewest: tuple[int, int]) -> Index:
             if fits and least <= cost:
                 stop, cost = int(first[number]), least
         if cost < best[0]:
-            best = cost, order[stop:]
+            best = cost, axis.order[stop:]
     return best[1]
 
 
@@ -116,8 +134,10 @@ def elimination_work(lattice: Index, others: Index, steps: int = 1) -> float:
     while regions:
         nodes, around = regions.pop()
         beyond = 3.0 * len(around)
-        axis, value = best_plane(nodes, np.arange(len(nodes)), steps)
-        if len(nodes) <= FEW or axis < 0:
+        axis, value = -1, 0
+        if len(nodes) > FEW:
+            axis, value = best_plane(nodes, np.arange(len(nodes)), steps)
+        if axis < 0:
             # As in a cube, whose plane has so many unknowns.
             plane = 3.0 * len(nodes) ** (2.0 / 3.0)
             work += 2.0 * plane**3 + plane * beyond**2
@@ -132,6 +152,6 @@ def elimination_work(lattice: Index, others: Index, steps: int = 1) -> float:
 
 
 def _near(nodes: Index, others: Index, steps: int) -> Index:
-    """Those of the nodes that lie in the box of the `others`, or so many steps beside it."""
+    """Nodes in the box of the `others`, widened by so many steps."""
     low, high = others.min(axis=0) - steps, others.max(axis=0) + steps
     return nodes[((nodes >= low) & (nodes <= high)).all(axis=1)]

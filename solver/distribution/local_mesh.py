@@ -13,6 +13,7 @@ from carillon.fem.elements import Chosen, Elements
 from carillon.fem.model import Solid
 from solver.distribution.collective import AnyArray, bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.decomposition import Decomposition, decompose, decompose_by_planes
+from solver.distribution.planes import lattice_of
 
 _LOCAL_MESH, _MODULI = 10, 12
 
@@ -81,8 +82,7 @@ class LocalMesh:
 
     def lattice(self) -> Index:
         """Integer coordinates (stop - start, 3) of this rank's nodes, in `Elements.edge`."""
-        positions = (self.positions - self.origin) / self.cells.elements.edge
-        return np.rint(positions).astype(np.int64)
+        return lattice_of(self.positions, self.origin, self.cells.elements.edge)
 
     def cells_by_subdomain(self, parts: range) -> dict[int, Index]:
         """Positions in `cells` of those that touch each subdomain in `parts`, ascending."""

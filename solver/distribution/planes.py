@@ -3,8 +3,15 @@
 import numba
 import numpy as np
 
+from carillon.arrays import Array, Index
+
 SHORTEST_SIDE = 0.2
 """Least share of the nodes on either side of a cut, if there is such a cut."""
+
+
+def lattice_of(positions: Array, origin: Array, edge: float) -> Index:
+    """Integer coordinates (n, 3), in edges from the origin, of nodes at positions [m]."""
+    return np.asarray(np.rint((positions - origin) / edge)).astype(np.int64)
 
 
 @numba.njit(cache=True, nogil=True)

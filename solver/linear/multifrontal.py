@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.errors import LocalConvergenceError
 from carillon.numerics.small_gemm import block, lanes_of
+from carillon.processes.memory import available_memory
 from carillon.processes.threads import in_parallel, in_tree, split
 from solver.linear.elimination import eliminate_fronts
 from solver.linear.plan import Part, Plan
@@ -30,8 +32,8 @@ class Factor:
 
     Of its pivots `negative` are negative: so many eigenvalues are below the shift, by Sylvester's
     law of inertia. `rest` is the matrix that is left of the nodes that the plan keeps, packed (see
-    `solver.linear.plan.packed_size`). Raises LocalConvergenceError if the shift is an eigenvalue to
-    rounding.
+    `solver.linear.plan.packed_size`). Raises LocalConvergenceError if it would not fit in memory,
+    or the shift is an eigenvalue to rounding.
 
     Parameters
     ----------
@@ -48,6 +50,7 @@ class Factor:
     def __init__(
         self, plan: Plan, stiffness: Array, mass: Array, shift: float, threads: int = 1
     ) -> None:
+        require_memory(3 * len(plan.position), plan.bytes)
         self._plan = plan
         self._threads = threads
         self.shift = shift
@@ -165,4 +168,18 @@ class Factor:
             plan.pivot_offset,
             self._coupling,
             plan.coupling_offset,
+        )
+
+
+def require_memory(unknowns: int, needed: int) -> None:
+    """Raise LocalConvergenceError unless so many bytes are free for a factorisation.
+
+    The system lends memory that it has not got, and kills who uses it.
+    """
+    available = available_memory()
+    if available is not None and needed > available:
+        raise LocalConvergenceError(
+            f"the sparse factorisation of {unknowns:,} unknowns takes about "
+            f"{needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver "
+            "amg-cg, or more ranks on more machines"
         )

@@ -11,25 +11,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.errors import ConvergenceError
+from carillon.fem.block import degrees_of_freedom
 from carillon.processes.memory import available_memory
 from solver.distribution.collective import on_every_rank, sum_over_machine
 from solver.distribution.rank_groups import communicator
 from solver.linear.elimination import eliminate_fronts
-from solver.linear.multifrontal import Factor
-from solver.linear.plan import STRIP, Plan
+from solver.linear.multifrontal import Factor, require_memory
+from solver.linear.plan import Plan
 from solver.linear.separators import Separators
 from solver.linear.shared_factor import SharedFactor
-from solver.linear.shared_front import Child, SharedFront, Strips, owners
+from solver.linear.shared_front import Child, SharedFront, Strips, bounds_of, owners
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
 
 
 class RankTree:
-    """What the factorisation needs to know of the mesh alone.
+    """Order of elimination, separating nodes and shared fronts of a mesh, for any material.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class RankTree:
         lattice, columns = layout.local_mesh.lattice(), pattern.columns
         self.fronts: list[SharedFront] = []
         if comm.size == 1:
-            self.kept = np.empty(0, dtype=np.int64)
+            self.kept = self._start = np.empty(0, dtype=np.int64)
             self.plan = Plan(lattice, pattern.indptr, columns, steps=steps)
             return
         separators = Separators.of_layout(layout)
@@ -59,6 +61,8 @@ class RankTree:
         inside = np.flatnonzero(places[: self.own] < 0)
         indptr = np.concatenate([pattern.indptr, ghosts])
         self.plan = Plan(lattice, indptr, columns, steps=steps, inside=inside, kept=self.kept)
+        # A packed matrix is that of a front on one rank, none of whose rows is its own.
+        self._start = Strips(bounds_of(0, 3 * len(self.kept)), 0, 1).start
         self._share_fronts(separators, places[self.kept])
 
     def _share_fronts(self, separators: Separators, beyond: Index) -> None:
@@ -91,27 +95,17 @@ class RankTree:
 
         Collective.
         """
-        _, shares = self._needs(self.bytes)
-        return max(shares) < share
-
-    def _needs(self, own: int) -> tuple[int, list[float]]:
-        """Sum over the ranks of the bytes that each needs, and shares of free memory; collective.
-
-        The share is that of the rank's machine, of which all its ranks take.
-        """
-        available, needed = available_memory(), sum_over_machine(self.comm, own)
-        share = 0.0 if available is None else needed / max(available, 1)
-        return self.comm.allreduce(own), self.comm.allgather(share)
+        available, needed = available_memory(), sum_over_machine(self.comm, self.bytes)
+        fits = available is None or needed < share * available
+        return bool(self.comm.allreduce(fits, MPI.LAND))
 
     def _require_memory(self, own: int) -> None:
-        """The system lends memory that it has not got, and kills who uses it."""
-        needed, shares = self._needs(own)
-        if max(shares) > 1.0:
-            raise ConvergenceError(
-                f"the sparse factorisation of {self._unknowns:,} unknowns takes about "
-                f"{needed / 1e9:.1f} GB, {needed / max(shares) / 1e9:.1f} GB are free; use "
-                "--linear-solver amg-cg, or more ranks on more machines"
-            )
+        """Refuse on every rank what takes more memory than one of the machines has.
+
+        Each rank passes what it needs of its machine's.
+        """
+        needed = sum_over_machine(self.comm, own)
+        on_every_rank(self.comm, lambda: require_memory(self._unknowns, needed))
 
     def inverse(self, system: System, shift: float) -> TreeInverse | Factor:
         """(K - shift M)^-1; collective. Raises ConvergenceError on every rank if it fails."""
@@ -145,15 +139,14 @@ class RankTree:
         Returns how many pivots of all ranks are negative, and this rank's part of the fronts.
         """
         shared = []
-        start = Strips(_bounds_of_packed(3 * len(self.kept)), 0, 1).start
-        failed = False
+        start, failed = self._start, False
         for front in self.fronts:
             data = front.assembled(rest, start)
             factor = SharedFactor(front, data, threads)
             shared.append(factor)
             negative += factor.negative
             failed |= factor.failed
-            rest, start = front.left(data)
+            rest, start = data, front.start_beyond
         negative, failures = self.comm.allreduce(np.array([negative, failed]))
         if failures:
             raise ConvergenceError("the shifted matrix is singular to rounding; change the shift")
@@ -178,7 +171,7 @@ class TreeInverse:
         self._tree, self._factor, self._shared = tree, factor, shared
         # This rank's own among the nodes that it keeps, as unknowns of either.
         mine = np.flatnonzero(tree.kept < tree.own)
-        self._own_kept = _three(mine), _three(tree.kept[mine])
+        self._own_kept = degrees_of_freedom(mine), degrees_of_freedom(tree.kept[mine])
 
     def solve(self, block: Array) -> Array:
         """Solutions for a row-major block of right-hand sides (local unknowns, k); collective."""
@@ -220,15 +213,6 @@ def _kept_nodes(layout: Layout, separators: Separators, places: Index) -> Index:
     return nodes[np.argsort(places[nodes])]
 
 
-def _bounds_of_packed(rows: int) -> Index:
-    """First rows of the strips of a packed matrix, see `solver.linear.plan.packed_size`."""
-    return np.array([*range(0, rows, STRIP), rows], dtype=np.int64)
-
-
-def _three(nodes: Index) -> Index:
-    return (3 * nodes[:, None] + np.arange(3)).ravel()
-
-
 def _unknowns(nodes: Index, some: Index) -> Index:
     """Places of the unknowns of some ascending nodes among those of `nodes`."""
-    return _three(np.searchsorted(nodes, some))
+    return degrees_of_freedom(np.searchsorted(nodes, some))

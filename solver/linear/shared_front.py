@@ -38,7 +38,6 @@ class Strips:
     def __init__(self, bounds: Index, rank: int, ranks: int) -> None:
         self.bounds = bounds
         self.rows = int(bounds[-1])
-        self.ranks = ranks
         self.mine = range(rank, len(bounds) - 1, ranks)
         self.place: dict[int, int] = {}
         self.start = np.zeros(self.rows, dtype=np.int64)
@@ -60,7 +59,7 @@ class Strips:
 
 @dataclass(frozen=True)
 class Child:
-    """What the elimination leaves of the rows beyond to half of the ranks, in strips."""
+    """Rows that half of the ranks have not eliminated and hold in strips."""
 
     ranks: range
     """Ranks in the group that hold its strips in turn."""
@@ -71,7 +70,7 @@ class Child:
 
 
 class SharedFront:
-    """What depends on the mesh alone of a front that the ranks of a group share.
+    """Rows, their holders and their messages, of a front that the ranks of a group share.
 
     Parameters
     ----------
@@ -90,14 +89,17 @@ class SharedFront:
         (own + beyond,) rank of the group that holds each row.
     order
         (own,) own rows by rank, as they come out of an exchange; `counts` so many a rank.
+    start_beyond
+        (beyond,) place in the data where each row begins of those that the elimination leaves.
     """
 
     def __init__(self, comm: MPI.Comm, own: int, beyond: int, children: list[Child]) -> None:
         self.comm = comm
         self.own, self.beyond = own, beyond
-        bounds = _bounds(own, beyond)
+        bounds = bounds_of(own, beyond)
         self.panels = len(split(own, 1, STRIP))
         self.strips = Strips(bounds, comm.rank, comm.size)
+        self.start_beyond = self.strips.start[own:] + own
         self.owner = owner = _owner(bounds, comm.size)
         self.counts = [int((owner[:own] == rank).sum()) for rank in range(comm.size)]
         self.order = np.argsort(owner[:own], kind="stable")
@@ -146,12 +148,8 @@ class SharedFront:
             place += size
         return result
 
-    def left(self, data: Array) -> tuple[Array, Index]:
-        """What the elimination leaves of the rows beyond: the data, and where each row begins."""
-        return data, self.strips.start[self.own :] + self.own
 
-
-def _bounds(own: int, beyond: int) -> Index:
+def bounds_of(own: int, beyond: int) -> Index:
     """First rows of the strips of a front, and its number of rows."""
     panels = [stop for _, stop in split(own, 1, STRIP)]
     rest = [*range(own + STRIP, own + beyond, STRIP), own + beyond] if beyond else []
@@ -164,7 +162,7 @@ def _owner(bounds: Index, ranks: int) -> Index:
 
 def owners(own: int, beyond: int, ranks: int) -> Index:
     """Rank, of so many, that holds each of the rows beyond (beyond,) of a front."""
-    return _owner(_bounds(own, beyond), ranks)[own:]
+    return _owner(bounds_of(own, beyond), ranks)[own:]
 
 
 def _rows(child: Child, holder: int, chosen: Array) -> Index:
