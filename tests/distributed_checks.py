@@ -415,9 +415,7 @@ def multigrid_is_the_same_bits_again() -> None:
     matrix = system.K.copy()
     matrix.shift(1e-3 * matrix.norm())
     block = np.ones((len(system.rigid), 2))
-    first, *others = (
-        Multigrid(matrix, system.rigid, COMM, dtype=np.float64).apply(block) for _ in range(8)
-    )
+    first, *others = (Multigrid(matrix, system.rigid, COMM).apply(block) for _ in range(8))
     assert all((other == first).all() for other in others)
 
 

@@ -16,7 +16,7 @@ from carillon.processes.petsc import PETSc
 from solver.assembly.sparse import assembled
 from solver.assembly.system import System, assemble
 from solver.distribution.local_mesh import distribute
-from solver.linear.block_rows import BlockRows
+from solver.linear.block_rows import block_rows, diagonal
 from solver.linear.iterative import METHODS, IterativeInverse
 from solver.linear.multigrid import Multigrid
 from solver.subspace.rayleigh_ritz import safe_shift
@@ -91,26 +91,30 @@ def columns_are_solved_each_on_its_own() -> None:
 def rows_multiply_as_the_matrix_does() -> None:
     system = system_of(solids.random_box(6, 5, 4))
     block = right_hand_sides(system, 5)
-    rows = BlockRows(system.K, COMM, np.float64, threads=THREADS)
+    rows = block_rows(system.K, COMM, threads=THREADS)
     expected = system.times_stiffness(block)
     assert np.abs(rows.times(block) - expected).max() < 1e-12 * np.abs(expected).max()
     first, _ = system.K.getOwnershipRange()
-    diagonal = system.K.getDiagonal().getArray()
-    assert len(diagonal) == 3 * (system.stop - system.start) and first == 3 * system.start
-    assert (rows.diagonal() == diagonal).all()
+    expected = system.K.getDiagonal().getArray()
+    assert len(expected) == 3 * (system.stop - system.start) and first == 3 * system.start
+    assert (diagonal(rows) == expected).all()
 
 
 def multigrid_is_symmetric_positive_definite() -> None:
     system = system_of(solids.random_box(16, 9, 8))
     matrix = system.K.copy()
     matrix.axpy(safe_shift(system), system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    grid = Multigrid(matrix, system.rigid, COMM, dtype=np.float64)
-    assert len(grid.sizes) > 1 and grid.sizes[-1] == system.n_dofs
     rhs = solids.local_rows(system, np.random.default_rng(0).standard_normal((system.n_dofs, 12)))
-    gram = system.inner(rhs, grid.apply(rhs))
-    assert np.abs(gram - gram.T).max() < 1e-12 * np.abs(gram).max()
-    assert np.linalg.eigvalsh(gram)[0] > 0.0
-    grid.destroy()
+    for finest in (None, system.rows.stiffness_products):
+        grid = Multigrid(matrix, system.rigid, COMM, finest)
+        assert len(grid.sizes) > 1 and grid.sizes[-1] == system.n_dofs
+        gram = system.inner(rhs, grid.apply(rhs))
+        assert np.abs(gram - gram.T).max() < 1e-12 * np.abs(gram).max()
+        assert np.linalg.eigvalsh(gram)[0] > 0.0
+        # A column is the same beside fewer than fill a register.
+        few = grid.apply(np.ascontiguousarray(rhs[:, :2]))
+        assert np.abs(few - grid.apply(rhs)[:, :2]).max() < 1e-12 * np.abs(few).max()
+        grid.destroy()
     matrix.destroy()
 
 

@@ -1,12 +1,15 @@
 """Products of a rank's rows with blocks of vectors of any width, against scipy's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
 from carillon.numerics.simd_width import LANES
-from solver.assembly.row_products import ROWS_NEAR, multiply
+from solver.assembly import row_products
+from solver.assembly.row_kernels import ROWS_NEAR, multiply
 from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
 from tests import solids
@@ -37,6 +40,37 @@ def test_a_column_is_the_same_bits_whatever_is_beside_it(system):
         whole = product(block)
         for width in WIDTHS:
             assert (product(block[:, -width:]) == whole[:, -width:]).all()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_projections_are_products_with_the_sparse_matrices(width, system):
+    random = np.random.default_rng(width)
+    left, right = (random.standard_normal((system.n_dofs, count)) for count in (13, width))
+    rows = system.rows
+    for product, matrix in (
+        (system.project_stiffness, rows.stiffness_csr(system.n_dofs)),
+        (system.project_mass, rows.mass_csr(system.n_dofs)),
+    ):
+        # Rows of a wider block, too.
+        found = product(np.concatenate([left, left], axis=1)[:, :13], right)
+        scale = abs(left.T) @ (abs(matrix) @ abs(right))
+        assert found.shape == (13, width)
+        assert (np.abs(found - left.T @ (matrix @ right)) <= ROUNDING * scale).all()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_rows_of_a_product_come_once_each(threads, system, monkeypatch):
+    monkeypatch.setattr(row_products, "NODES_AT_ONCE", 50)
+    block = np.random.default_rng(0).standard_normal((system.n_dofs, LANES))
+    products = replace(system.rows.stiffness_products, threads=threads)
+    found = np.full_like(block, np.nan)
+
+    def take(here: slice, image: np.ndarray) -> None:
+        assert np.isnan(found[here]).all()
+        found[here] = image
+
+    products.by_rows(block, take)
+    assert (found == products.times(block)).all()
 
 
 @pytest.mark.parametrize("size", [1, 3])

@@ -1,33 +1,22 @@
-"""A rank's rows of K and M in 3x3 blocks of nodes, and their products with blocks of vectors.
-
-PETSc multiplies a sparse matrix with column-major blocks; here blocks are row-major, so that one
-entry of the matrix meets whole rows of the block, which is several times faster, and the rows that
-a rank needs of others travel in one message a neighbour.
-"""
+"""A rank's rows of K and M in 3x3 blocks of nodes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numba
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
 from carillon.fem.elements import Elements
-from carillon.numerics.simd_width import LANES
-from carillon.processes.threads import in_parallel, split
-from solver.assembly.row_products import multiply
-
-Real = TypeVar("Real", np.float64, np.floating)
+from solver.assembly.halo import Halo
+from solver.assembly.row_products import RowProducts
 
 ENTRIES_AT_ONCE = 4096 * 576
 """Number of entries of element matrices that exist at once while K is assembled."""
-_HALO = 21
 
 
 @dataclass(frozen=True)
@@ -74,47 +63,6 @@ class Pattern:
         result = self.columns + self.start
         result[~inside] = self.ghosts[self.columns[~inside] - n_own]
         return result
-
-
-class Halo:
-    """Exchange of the rows that ranks need of each other, three for a node.
-
-    Parameters
-    ----------
-    ghosts
-        (g,) numbers of the nodes that this rank needs of others, ascending.
-    start, starts
-        First node of this rank, and (ranks + 1,) of every rank.
-    """
-
-    def __init__(self, ghosts: Index, start: int, starts: Index, comm: MPI.Comm) -> None:
-        self._comm = comm
-        bounds = np.searchsorted(ghosts, starts)
-        self._received = [
-            (rank, bounds[rank], bounds[rank + 1])
-            for rank in range(comm.size)
-            if bounds[rank] < bounds[rank + 1]
-        ]
-        needed = [ghosts[bounds[rank] : bounds[rank + 1]] for rank in range(comm.size)]
-        self._ghosts = len(ghosts)
-        asked = comm.alltoall(needed) if comm.size > 1 else [needed[0]]
-        self._sent = [(rank, rows - start) for rank, rows in enumerate(asked) if len(rows)]
-
-    def exchange(self, block: NDArray[Real]) -> NDArray[Real]:
-        """Rows (3 g, k) of the ghosts, of a block (3 local nodes, k) that every rank passes."""
-        if not self._received and not self._sent:
-            return block[:0]
-        width = 3 * block.shape[1]
-        ghosts = np.empty((self._ghosts, width), dtype=block.dtype)
-        nodes = np.ascontiguousarray(block).reshape(-1, width)
-        requests = [
-            self._comm.Irecv(ghosts[start:stop], source=rank, tag=_HALO)
-            for rank, start, stop in self._received
-        ]
-        buffers = [(rank, nodes[rows]) for rank, rows in self._sent]
-        requests += [self._comm.Isend(rows, dest=rank, tag=_HALO) for rank, rows in buffers]
-        MPI.Request.Waitall(requests)
-        return ghosts.reshape(-1, block.shape[1])
 
 
 class NodeRows:
@@ -183,14 +131,24 @@ class NodeRows:
 
     def stiffness_csr(self, n_dofs: int) -> sp.csr_matrix:
         """This rank's rows of K (local unknowns, n_dofs), columns in the distributed order."""
-        data = (self.stiffness, self.pattern.global_columns, self.pattern.indptr)
-        return _sorted(sp.bsr_matrix(data, shape=(3 * self._own, n_dofs)).tocsr())
+        return self._csr_of(self.stiffness, n_dofs)
+
+    def shifted_csr(self, shift: float, n_dofs: int) -> sp.csr_matrix:
+        """This rank's rows of K - shift M (local unknowns, n_dofs), see `stiffness_csr`."""
+        blocks = self.stiffness.copy()
+        for component in range(3):
+            blocks[:, component, component] -= shift * self.mass
+        return self._csr_of(blocks, n_dofs)
 
     def mass_csr(self, n_dofs: int) -> sp.csr_matrix:
         """This rank's rows of M (local unknowns, n_dofs), columns in the distributed order."""
         data = (self.mass, self.pattern.global_columns, self.pattern.indptr)
         nodal = sp.csr_matrix(data, shape=(self._own, n_dofs // 3))
         return _sorted(sp.kron(nodal, sp.identity(3), format="csr"))
+
+    def _csr_of(self, blocks: Array, n_dofs: int) -> sp.csr_matrix:
+        data = (blocks, self.pattern.global_columns, self.pattern.indptr)
+        return _sorted(sp.bsr_matrix(data, shape=(3 * self._own, n_dofs)).tocsr())
 
     @property
     def _own(self) -> int:
@@ -201,33 +159,27 @@ class NodeRows:
         """Whether this rank's part of M is diagonal."""
         return bool(np.count_nonzero(self.mass) == self._own)
 
+    @cached_property
+    def stiffness_products(self) -> RowProducts:
+        """K, to be multiplied with blocks."""
+        return self._products(self.stiffness)
+
+    @cached_property
+    def mass_products(self) -> RowProducts:
+        """M, to be multiplied with blocks: the components of a node all have the same mass."""
+        return self._products(self.mass[:, None, None])
+
+    def _products(self, entries: Array) -> RowProducts:
+        graph = self.pattern.indptr, self.pattern.columns
+        return RowProducts(graph, entries, self.halo, self.threads)
+
     def times_stiffness(self, block: Array) -> Array:
         """K X for a row-major block (3 local nodes, k); collective."""
-        return self._product(block, True)
+        return self.stiffness_products.times(block)
 
     def times_mass(self, block: Array) -> Array:
         """M X for a row-major block (3 local nodes, k); collective."""
-        return self._product(block, False)
-
-    def _product(self, block: Array, stiffness: bool) -> Array:
-        width = block.shape[1]
-        block = np.ascontiguousarray(block)
-        if width < LANES:
-            narrow, block = block, np.zeros((len(block), LANES))
-            block[:, :width] = narrow
-        ghosts = block[:0] if self.halo is None else self.halo.exchange(block)
-        result = np.empty_like(block)
-        graph = self.pattern.indptr, self.pattern.columns
-        # The three components of a node follow each other, and all have the same mass.
-        entries, components = (self.stiffness, 1) if stiffness else (self.mass[:, None, None], 3)
-        shape = (-1, components * block.shape[1])
-        arrays = block.reshape(shape), ghosts.reshape(shape), result.reshape(shape)
-
-        def rows(start: int, stop: int) -> None:
-            multiply((start, stop), graph, entries, *arrays)
-
-        in_parallel(rows, split(self._own, self.threads, max(self._own, 1)), self.threads)
-        return result if width >= LANES else np.ascontiguousarray(result[:, :width])
+        return self.mass_products.times(block)
 
 
 def _sorted(matrix: sp.csr_matrix) -> sp.csr_matrix:

@@ -1,129 +1,121 @@
-"""Products of rows of small blocks with blocks of vectors, whose sums stay in registers.
+"""Products of a rank's rows of a sparse matrix of small blocks with blocks of vectors.
 
-A row of the result is gathered from the rows of a node's neighbours, for as many columns at a time
-as registers hold: nothing is stored before it is complete. What a column comes to does not depend
-on the columns beside it.
+PETSc multiplies a sparse matrix with column-major blocks; here blocks are row-major, so that one
+entry of the matrix meets whole rows of the block, which is several times faster, and the rows that
+a rank needs of others travel in one message a neighbour.
 """
 
-from functools import cache
-from pathlib import Path
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
-from numba import literally
 
 from carillon.arrays import Array, Index
-from carillon.numerics import small_gemm
-from carillon.numerics.simd import add_gathered, compiler, sliding, store_tile, zeros
 from carillon.numerics.simd_width import LANES
-from carillon.numerics.small_gemm import WIDE
+from carillon.processes.threads import in_parallel, split
+from solver.assembly.halo import Halo
+from solver.assembly.row_kernels import multiply
 
-compiled = compiler(Path(__file__), Path(small_gemm.__file__))
-
-STRIPS = (8, 4, 3, 2, 1)
-"""Widths of a strip of columns, in registers."""
-ROWS_NEAR = 128
-"""Number of rows that are gone through for some of the columns before the next columns, so that
-what these rows share stays in the cache."""
+NODES_AT_ONCE = 256
+"""Number of nodes whose rows of a product exist at once where they are used up one by one."""
 
 
-def multiply(
-    rows: tuple[int, int],
-    graph: tuple[Index, Index],
-    blocks: Array,
-    vectors: Array,
-    ghosts: Array,
-    result: Array,
-) -> None:
-    """Rows [start, stop) of the product of a matrix of blocks with vectors.
+@dataclass(frozen=True)
+class RowProducts:
+    """Rows of a sparse matrix of blocks, three unknowns a node.
 
     Parameters
     ----------
-    rows
-        Start and stop.
     graph
-        Compressed rows: where each begins, and the columns. Those from the number of rows of
-        `vectors` on count the ghosts.
-    blocks : (e, b, b)
-        Along the graph; b is 1 or 3.
-    vectors, ghosts : (b n, k), (b g, k)
-        Row-major, k at least `LANES`.
-    result : (b n, k)
-        Of which the rows are written.
+        Compressed rows: where each begins (nodes + 1,), and the columns (e,): this rank's nodes,
+        counted from 0, then those of others, ascending within a row.
+    entries
+        (e, b, b) blocks along the graph. Of b = 1, the same number for the three unknowns.
+    halo
+        Exchange of the columns of others; None if there are none.
     """
-    width, size = vectors.shape[1], blocks.shape[1]
-    flat = [sliding(each.reshape(-1)) for each in (vectors, ghosts, result)]
-    kernel, widest = (_multiply_scalars, 2 * WIDE) if size == 1 else (_multiply_blocks, WIDE)
-    strips = _strips(width, widest)
-    kernel(rows, len(vectors) // size, *graph, blocks.reshape(-1), *flat, width, strips)
 
+    graph: tuple[Index, Index]
+    entries: Array
+    halo: Halo | None = None
+    threads: int = 1
 
-@cache
-def _strips(width: int, widest: int) -> Index:
-    """First column, and registers, of strips that cover so many columns.
+    @property
+    def nodes(self) -> int:
+        """Number of rows, one a node."""
+        return len(self.graph[0]) - 1
 
-    The last ones may go over columns once more, so that all registers are full.
-    """
-    strips, column = [], 0
-    while column < width:
-        most = min(widest, -(-(width - column) // LANES), width // LANES)
-        wide = max(each for each in STRIPS if each <= most)
-        column = min(column, width - wide * LANES)
-        strips.append((column, wide))
-        column += wide * LANES
-    return np.array(strips)
+    def times(self, block: Array) -> Array:
+        """Product (3 nodes, k) with a row-major block (3 local columns, k); collective."""
+        width = block.shape[1]
+        block, ghosts = self._with_ghosts(block)
+        result = np.empty((3 * self.nodes, block.shape[1]))
 
+        def rows(start: int, stop: int) -> None:
+            self._multiply(start, stop, block, ghosts, result[3 * start : 3 * stop])
 
-@compiled
-def _strip(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, place, size, wide
-):
-    """Some rows of the result, `wide` registers of each; `size` and `wide` are literals."""
-    start, stop = rows
-    column, width = place
-    near = (vectors, column, LANES, width, size * width)
-    far = (ghosts, column - size * width * own, LANES, width, size * width)
-    for row in range(start, stop):
-        first, last = indptr[row], indptr[row + 1]
-        middle = last
-        while middle > first and columns[middle - 1] >= own:
-            middle -= 1
-        sums = add_gathered(zeros(size, wide), blocks, near, columns, (first, middle))
-        if middle < last:
-            sums = add_gathered(sums, blocks, far, columns, (middle, last))
-        store_tile((result, size * row * width + column, width, LANES), sums)
+        in_parallel(rows, self._ranges(), self.threads)
+        return result if width >= LANES else np.ascontiguousarray(result[:, :width])
 
+    def by_rows(self, block: Array, work: Callable[[slice, Array], None]) -> None:
+        """Call `work` with some rows and the product there (3 r, k), until it had all rows.
 
-@compiled
-def _multiply(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, size
-):
-    literally(size)
-    for first in range(rows[0], rows[1], ROWS_NEAR):
-        few = (first, min(first + ROWS_NEAR, rows[1]))
-        for strip in range(len(strips)):
-            place = (strips[strip, 0], width)
-            wide = strips[strip, 1]
-            if wide == 8:
-                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 8)
-            elif wide == 4:
-                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 4)
-            elif wide == 3:
-                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 3)
-            elif wide == 2:
-                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 2)
-            else:
-                _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 1)
+        Collective. It may run in several threads at once, and must not change the block, whose
+        width k is at least `LANES`.
+        """
+        block, ghosts = self._with_ghosts(block)
 
+        def rows(start: int, stop: int) -> None:
+            for here, few in self._pieces(start, stop, block, ghosts):
+                work(here, few)
 
-@compiled
-def _multiply_blocks(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips
-):
-    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, 3)
+        in_parallel(rows, self._ranges(), self.threads)
 
+    def projected(self, left: Array, right: Array) -> Array:
+        """This rank's part of left^T A right (l, r), for blocks (3 nodes, l or r); collective."""
+        width = right.shape[1]
+        right, ghosts = self._with_ghosts(right)
 
-@compiled
-def _multiply_scalars(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips
-):
-    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, 1)
+        def rows(start: int, stop: int) -> Array:
+            # Of the two products of row-major blocks, the one that BLAS makes faster.
+            total = np.zeros((right.shape[1], left.shape[1]))
+            for here, few in self._pieces(start, stop, right, ghosts):
+                total += few.T @ left[here]
+            return total
+
+        none = np.zeros((right.shape[1], left.shape[1]))
+        total = sum(in_parallel(rows, self._ranges(), self.threads), none)
+        return np.ascontiguousarray(total[:width].T)
+
+    def _ranges(self) -> list[tuple[int, int]]:
+        return split(self.nodes, self.threads, max(self.nodes, 1))
+
+    def _pieces(
+        self, start: int, stop: int, block: Array, ghosts: Array
+    ) -> Iterator[tuple[slice, Array]]:
+        """Rows and the product there, a few nodes at a time."""
+        image = np.empty((3 * min(NODES_AT_ONCE, stop - start), block.shape[1]))
+        for first in range(start, stop, NODES_AT_ONCE):
+            last = min(first + NODES_AT_ONCE, stop)
+            few = image[: 3 * (last - first)]
+            self._multiply(first, last, block, ghosts, few)
+            yield slice(3 * first, 3 * last), few
+
+    def _with_ghosts(self, block: Array) -> tuple[Array, Array]:
+        """A contiguous block that fills a register, and the rows of others; collective."""
+        width = block.shape[1]
+        block = np.ascontiguousarray(block)
+        if width < LANES:
+            narrow, block = block, np.zeros((len(block), LANES))
+            block[:, :width] = narrow
+        return block, block[:0] if self.halo is None else self.halo.exchange(block)
+
+    def _multiply(self, start: int, stop: int, block: Array, ghosts: Array, result: Array) -> None:
+        """Rows (3 (stop - start), k) of the product for the nodes [start, stop)."""
+        indptr, columns = self.graph
+        shape = (-1, 3 // self.entries.shape[1] * block.shape[1])
+        arrays = (each.reshape(shape) for each in (block, ghosts, result))
+        rows = indptr[start : stop + 1], columns
+        multiply((0, stop - start), rows, self.entries, *arrays)

@@ -21,7 +21,8 @@ from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import rigid_motions
 from carillon.fem.elements import Elements
 from carillon.processes.petsc import PETSc
-from solver.assembly.node_rows import Halo, NodeRows, Pattern
+from solver.assembly.halo import Halo
+from solver.assembly.node_rows import NodeRows, Pattern
 from solver.distribution.collective import compute_on_root, gather_rows
 from solver.distribution.local_mesh import LocalMesh
 
@@ -81,6 +82,14 @@ class System:
     def times_mass(self, block: Array) -> Array:
         """Product of M with a block of vectors; collective."""
         return self.rows.times_mass(block)
+
+    def project_stiffness(self, left: Array, right: Array) -> Array:
+        """left^T K right summed over the ranks; equal on all ranks, collective."""
+        return self.summed(self.rows.stiffness_products.projected(left, right))
+
+    def project_mass(self, left: Array, right: Array) -> Array:
+        """left^T M right summed over the ranks; equal on all ranks, collective."""
+        return self.summed(self.rows.mass_products.projected(left, right))
 
     @cached_property
     def K(self) -> Any:  # noqa: N802

@@ -16,7 +16,7 @@ from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.processes.petsc import PETSc
 from carillon.processes.threads import in_parallel, split
-from solver.assembly.system import System
+from solver.assembly.system import System, distributed_matrix
 from solver.linear.factorisation import IncompleteCholesky
 from solver.linear.multigrid import Multigrid
 
@@ -83,13 +83,14 @@ class IterativeInverse:
 
     def _prepare(self) -> IncompleteCholesky | Multigrid:
         system = self._system
-        matrix = system.K.copy()
-        matrix.axpy(-self.shift, system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        matrix = distributed_matrix(system.rows.shifted_csr(self.shift, system.n_dofs), system.comm)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         try:
             if self._method == "icc-pcg":
                 return IncompleteCholesky(matrix)
-            return Multigrid(matrix, self._rigid, system.comm, threads=self._threads)
+            # The finest level leaves out the shift, which only rigid motions need on coarse ones.
+            finest = system.rows.stiffness_products
+            return Multigrid(matrix, self._rigid, system.comm, finest, self._threads)
         finally:
             matrix.destroy()
 

@@ -13,14 +13,13 @@ import numba
 import numpy as np
 import scipy.linalg as la
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from carillon.arrays import Array
+from carillon.numerics.simd_width import LANES
 from carillon.processes.petsc import PETSc
-from carillon.processes.threads import in_parallel, split
-from solver.linear.block_rows import BlockRows
+from solver.assembly.row_products import RowProducts
+from solver.linear.block_rows import block_rows, diagonal
 from solver.linear.petsc_options import MULTIGRID_PREFIX
-
-Array = NDArray[np.floating]
 
 THRESHOLD = 0.0
 """Largest coupling, relative to the diagonal, that does not join an aggregate."""
@@ -44,9 +43,9 @@ class Multigrid:
         Symmetric positive definite PETSc matrix (AIJ, block size 3).
     near_null
         (local, 6) rigid motions: what smoothing cannot reduce, and coarse levels must represent.
-    dtype
-        Numbers that the cycle computes with.  Single precision halves the traffic of memory, and is
-        enough for a preconditioner.
+    finest
+        This rank's rows of the matrix, or of one that hardly differs from it; copied from it if
+        not given.
     """
 
     def __init__(
@@ -54,16 +53,19 @@ class Multigrid:
         matrix: Any,
         near_null: Array,
         comm: MPI.Comm,
-        dtype: Any = np.float32,
+        finest: RowProducts | None = None,
         threads: int = 1,
     ) -> None:
-        self._dtype = np.dtype(dtype)
-        self._threads = threads
         pc = _aggregate(matrix, near_null, comm)
         count = pc.getMGLevels()
-        self._levels = [self._level(pc, number, comm) for number in range(count - 1, 0, -1)]
+        self._levels = []
+        for number in range(count - 1, 0, -1):
+            of_level, _ = pc.getMGSmoother(number).getOperators()
+            rows = finest if finest is not None and number == count - 1 else None
+            rows = block_rows(of_level, comm, threads) if rows is None else rows
+            self._levels.append(_Level.of(rows, pc.getMGInterpolation(number), comm))
         coarsest, _ = pc.getMGSmoother(0).getOperators()
-        self._coarsest = _Inverse(coarsest, comm, self._dtype)
+        self._coarsest = _Inverse(coarsest, comm)
         self.sizes = [
             pc.getMGSmoother(number).getOperators()[0].getSize()[0] for number in range(count)
         ]
@@ -71,81 +73,88 @@ class Multigrid:
 
     def apply(self, block: Array) -> Array:
         """One V-cycle from zero for a block of right-hand sides (local, k); collective."""
-        return self._cycle(0, block.astype(self._dtype)).astype(block.dtype)
+        width = block.shape[1]
+        if width >= LANES:
+            return self._cycle(0, np.ascontiguousarray(block))
+        padded = np.zeros((len(block), LANES))
+        padded[:, :width] = block
+        return np.ascontiguousarray(self._cycle(0, padded)[:, :width])
 
     def destroy(self) -> None:
         """Free the levels."""
         self._levels.clear()
 
-    def _level(self, pc: Any, number: int, comm: MPI.Comm) -> _Level:
-        matrix, _ = pc.getMGSmoother(number).getOperators()
-        interpolation = pc.getMGInterpolation(number)
-        restriction = interpolation.transpose(PETSc.Mat())
-        rows, prolong, restrict = (
-            BlockRows(each, comm, self._dtype, self._threads)
-            for each in (matrix, interpolation, restriction)
-        )
-        restriction.destroy()
-        diagonal = rows.diagonal()
-        # An aggregate of two nodes or one has fewer motions than its six coarse unknowns: what is
-        # interpolated from the others is zero.
-        used = diagonal > 0.0
-        scale = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=used)
-        return _Level(rows, prolong, restrict, scale, _largest_eigenvalue(rows, scale, comm))
-
     def _cycle(self, number: int, rhs: Array) -> Array:
         if number == len(self._levels):
             return self._coarsest.apply(rhs)
         level = self._levels[number]
-        solution = np.zeros_like(rhs)
-        residual = rhs.copy()
-        self._smooth(level, solution, residual)
-        correction = self._cycle(number + 1, level.restrict.times(residual))
-        level.prolong.add_product(correction, solution)
-        residual[:] = rhs
-        level.rows.add_product(solution, residual, -1.0)
-        self._smooth(level, solution, residual, last=True)
+        scale, first, following = level.scale, level.first, level.following
+        one, other, residual, solution = (np.empty_like(rhs) for _ in range(4))
+
+        def second_step(here: slice, image: Array) -> None:
+            columns = rhs[here], image, scale[here], one[here]
+            _second_step(*columns, residual[here], other[here], solution[here], *following)
+
+        def what_is_left(here: slice, image: Array) -> None:
+            residual[here] -= image
+
+        def correct(here: slice, image: Array) -> None:
+            solution[here] += image
+
+        def first_step(here: slice, image: Array) -> None:
+            _first_step(rhs[here], image, scale[here], residual[here], one[here], first)
+
+        def last_step(here: slice, image: Array) -> None:
+            columns = residual[here], image, scale[here], one[here]
+            _last_step(*columns, solution[here], *following)
+
+        np.multiply(rhs, (first * scale)[:, None], out=one)
+        level.rows.by_rows(one, second_step)
+        level.rows.by_rows(other, what_is_left)
+        coarse = self._cycle(number + 1, level.restrict.times(residual))
+        level.prolong.by_rows(coarse, correct)
+        level.rows.by_rows(solution, first_step)
+        level.rows.by_rows(one, last_step)
         return solution
-
-    def _smooth(self, level: _Level, solution: Array, residual: Array, last: bool = False) -> None:
-        """Improve `solution`, and update `residual` unless nobody needs it afterwards."""
-        low, high = (share * level.largest for share in SMOOTHED_SPECTRUM)
-        centre, half = 0.5 * (high + low), 0.5 * (high - low)
-        ratio = half / centre
-        step = np.empty_like(residual)
-        self._step(level, step, residual, solution, 0.0, 1.0 / centre)
-        level.rows.add_product(step, residual, -1.0)
-        following = 1.0 / (2.0 / ratio - ratio)
-        self._step(level, step, residual, solution, ratio * following, 2.0 * following / half)
-        if not last:
-            level.rows.add_product(step, residual, -1.0)
-
-    def _step(
-        self, level: _Level, step: Array, residual: Array, solution: Array, old: float, new: float
-    ) -> None:
-        """step = old * step + new * D^-1 residual, added to the solution."""
-        real = self._dtype.type
-
-        def rows(start: int, stop: int) -> None:
-            _take_step(start, stop, level.scale, step, residual, solution, real(old), real(new))
-
-        count = len(step)
-        in_parallel(rows, split(count, self._threads, max(count, 1)), self._threads)
 
 
 @dataclass(frozen=True)
 class _Level:
     """A level above the coarsest: its matrix, the way from and to the next, its smoother."""
 
-    rows: BlockRows
-    prolong: BlockRows
-    restrict: BlockRows
+    rows: RowProducts
+    prolong: RowProducts
+    restrict: RowProducts
     scale: Array
-    largest: float
+    """(local,) inverse of the diagonal D, zero where that is zero."""
+    first: float
+    """The first Chebyshev step is so many times D^-1 r."""
+    following: tuple[float, float]
+    """The second one is so many times the first, and so many times D^-1 r."""
+
+    @classmethod
+    def of(cls, rows: RowProducts, interpolation: Any, comm: MPI.Comm) -> _Level:
+        """Level of a matrix, from the interpolation (PETSc) of the next; collective."""
+        restriction = interpolation.transpose(PETSc.Mat())
+        prolong, restrict = (
+            block_rows(each, comm, rows.threads) for each in (interpolation, restriction)
+        )
+        restriction.destroy()
+        entries = diagonal(rows)
+        # An aggregate of two nodes or one has fewer motions than its six coarse unknowns: what is
+        # interpolated from the others is zero.
+        scale = np.divide(1.0, entries, out=np.zeros_like(entries), where=entries > 0.0)
+        largest = _largest_eigenvalue(rows, scale, comm)
+        low, high = (share * largest for share in SMOOTHED_SPECTRUM)
+        centre, half = 0.5 * (high + low), 0.5 * (high - low)
+        ratio = half / centre
+        growth = 1.0 / (2.0 / ratio - ratio)
+        following = ratio * growth, 2.0 * growth / half
+        return cls(rows, prolong, restrict, scale, 1.0 / centre, following)
 
 
 class _Inverse:
-    def __init__(self, matrix: Any, comm: MPI.Comm, dtype: Any) -> None:
+    def __init__(self, matrix: Any, comm: MPI.Comm) -> None:
         self._comm = comm
         size = matrix.getSize()[0]
         start, stop = matrix.getOwnershipRange()
@@ -155,7 +164,7 @@ class _Inverse:
         self._counts = comm.allgather(stop - start)
         # Aggregates of few nodes may leave a coarse unknown without stiffness.
         inverse = np.linalg.pinv(self._gather(own), rcond=1e-12, hermitian=True)
-        self._rows = inverse[start:stop].astype(dtype)
+        self._rows = np.ascontiguousarray(inverse[start:stop])
 
     def apply(self, block: Array) -> Array:
         """Product with `block` (local, k); collective."""
@@ -163,7 +172,7 @@ class _Inverse:
 
     def _gather(self, own: Array) -> Array:
         columns = own.shape[1]
-        whole = np.empty((sum(self._counts), columns), dtype=own.dtype)
+        whole = np.empty((sum(self._counts), columns))
         counts = [count * columns for count in self._counts]
         self._comm.Allgatherv(np.ascontiguousarray(own), (whole, counts))
         return whole
@@ -204,7 +213,7 @@ def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm) -> Any:
     return pc
 
 
-def _largest_eigenvalue(rows: BlockRows, scale: Array, comm: MPI.Comm) -> float:
+def _largest_eigenvalue(rows: RowProducts, scale: Array, comm: MPI.Comm) -> float:
     """Estimate by Lanczos' method, from below, of the largest eigenvalue of D^-1 A.
 
     `scale` is the diagonal of D^-1.  All ranks get the same bits.
@@ -214,17 +223,17 @@ def _largest_eigenvalue(rows: BlockRows, scale: Array, comm: MPI.Comm) -> float:
     def product(left: Array, right: Array) -> float:
         return float(comm.allreduce(np.vdot(left, right)))
 
-    vector = np.random.default_rng(comm.rank).standard_normal(root.shape).astype(root.dtype)
+    vector = np.random.default_rng(comm.rank).standard_normal(root.shape)
     vector *= root > 0.0
     before = np.zeros_like(vector)
     diagonal: list[float] = []
     off_diagonal = [np.sqrt(product(vector, vector))]
     for _ in range(LANCZOS_STEPS):
-        vector /= root.dtype.type(off_diagonal[-1])
+        vector /= off_diagonal[-1]
         image = root * rows.times(root * vector)
         diagonal.append(product(vector, image))
-        image -= root.dtype.type(diagonal[-1]) * vector
-        image -= root.dtype.type(off_diagonal[-1] if len(diagonal) > 1 else 0.0) * before
+        image -= diagonal[-1] * vector
+        image -= (off_diagonal[-1] if len(diagonal) > 1 else 0.0) * before
         before, vector = vector, image
         off_diagonal.append(np.sqrt(product(vector, vector)))
         if off_diagonal[-1] <= EXHAUSTED * diagonal[0]:
@@ -233,18 +242,30 @@ def _largest_eigenvalue(rows: BlockRows, scale: Array, comm: MPI.Comm) -> float:
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
-def _take_step(  # type: ignore[no-untyped-def]
-    start, stop, scale, step, residual, solution, old, new
+def _first_step(rhs, image, scale, residual, step, first):  # type: ignore[no-untyped-def]
+    for row in range(len(scale)):
+        weight = first * scale[row]
+        for k in range(rhs.shape[1]):
+            residual[row, k] = rhs[row, k] - image[row, k]
+            step[row, k] = weight * residual[row, k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _second_step(  # type: ignore[no-untyped-def]
+    rhs, image, scale, before, residual, step, solution, old, new
 ):
-    width = step.shape[1]
-    for row in range(start, stop):
+    for row in range(len(scale)):
         weight = new * scale[row]
-        d, r, x = step[row], residual[row], solution[row]
-        if old == 0.0:
-            for k in range(width):
-                d[k] = weight * r[k]
-                x[k] += d[k]
-        else:
-            for k in range(width):
-                d[k] = old * d[k] + weight * r[k]
-                x[k] += d[k]
+        for k in range(rhs.shape[1]):
+            residual[row, k] = rhs[row, k] - image[row, k]
+            step[row, k] = old * before[row, k] + weight * residual[row, k]
+            solution[row, k] = before[row, k] + step[row, k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+def _last_step(residual, image, scale, before, solution, old, new):  # type: ignore[no-untyped-def]
+    for row in range(len(scale)):
+        weight = new * scale[row]
+        for k in range(residual.shape[1]):
+            left = residual[row, k] - image[row, k]
+            solution[row, k] += (1.0 + old) * before[row, k] + weight * left
