@@ -25,7 +25,8 @@ from carillon.numerics.simd_width import LANES, REGISTERS
 
 BYTES = 8 * LANES
 
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+_NUMBER = ir.DoubleType()
+_VECTOR = ir.VectorType(_NUMBER, LANES)
 _INDEX = ir.IntType(64)
 
 
@@ -109,10 +110,13 @@ def _address(context: Any, builder: Any, kind: types.Array, array: Any, entry: A
 
 
 def _load(context: Any, builder: Any, kind: types.Array, array: Any, entry: Any) -> Any:
-    """A row of an array of lanes, or a number of a flat array in all lanes."""
+    """A row of an array of lanes, or a number of a flat array, in all lanes."""
     address = _address(context, builder, kind, array, entry)
     if kind.ndim == 1:
-        return _splat(builder, builder.load(address))
+        number = builder.load(address)
+        if kind.dtype == types.float32:
+            number = builder.fpext(number, _NUMBER)
+        return _splat(builder, number)
     return builder.load(address, align=8)
 
 

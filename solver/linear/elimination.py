@@ -1,6 +1,7 @@
 """Elimination of the fronts of a multifrontal factorisation, children before parents."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -25,6 +26,7 @@ def eliminate_fronts(
     shift: float,
     threads: int,
     kept: tuple[Array, Array] | None,
+    dtype: Any = np.float64,
 ) -> tuple[int, Array]:
     """Eliminate the rows of K - shift M that the plan eliminates.
 
@@ -38,6 +40,8 @@ def eliminate_fronts(
         See `solver.linear.multifrontal.Factor`.
     kept
         What a solve needs goes there: pivots with what couples panels, and W in strips.
+    dtype
+        Precision that the fronts are eliminated in, and kept in.
     """
     updates: dict[int, Array] = {}
     own_rows, outside = plan.own_rows, plan.outside_rows
@@ -69,7 +73,7 @@ def eliminate_fronts(
     def eliminated_part(part: Part, threads: int = 1) -> int:
         numbers = part.fronts
         largest = (own_rows[numbers] * (own_rows[numbers] + outside[numbers])).max()
-        room = np.empty(int(largest))
+        room = np.empty(int(largest), dtype)
         return sum(eliminated(int(front), room, threads) for front in numbers)
 
     # The fronts above the branches are few and large: threads share each of them.
@@ -79,7 +83,7 @@ def eliminate_fronts(
     for part, below in zip(tree.parts, tree.children, strict=True):
         if below:
             negative += eliminated_part(part, threads)
-    rest = updates.pop(last) if plan.kept else np.empty(0)
+    rest = updates.pop(last).astype(float, copy=False) if plan.kept else np.empty(0)
     np.negative(rest, out=rest)
     return negative, rest
 
@@ -99,7 +103,7 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
         with it of what couples the panel to the panels after.
     """
     n = len(own)
-    scaled = np.empty((n, n))
+    scaled = np.empty((n, n), own.dtype)
     inverses: list[Array] = []
     negative = place = 0
     for start, stop in split(n, 1, PANEL):
@@ -123,11 +127,12 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
 def inverse_of(block: Array) -> tuple[Array, int]:
     """Inverse of a symmetric matrix, given its upper triangle, and its negative eigenvalues."""
     room = BLOCKED * len(block)
-    factor, pivots, _ = la.lapack.dsytrf(np.array(block).T, lower=1, lwork=room, overwrite_a=1)
+    sytrf, sytri = la.get_lapack_funcs(("sytrf", "sytri"), (block,))
+    factor, pivots, _ = sytrf(np.array(block).T, lower=1, lwork=room, overwrite_a=1)
     # Every 2x2 pivot of Bunch and Kaufman has one eigenvalue of either sign.
     single = pivots > 0
     negative = int((np.diag(factor)[single] < 0.0).sum() + (~single).sum() // 2)
-    inverse, failed = la.lapack.dsytri(factor, pivots, lower=1, overwrite_a=1)
+    inverse, failed = sytri(factor, pivots, lower=1, overwrite_a=1)
     if failed:
         raise LocalConvergenceError("the shifted matrix is singular to rounding; change the shift")
     result = inverse.T
@@ -152,13 +157,13 @@ def _update(own: Array, inverses: list[Array], coupling: Array | None, threads: 
     n = len(own)
     beyond = own[:, n:]
     b = beyond.shape[1]
-    update = np.empty(packed_size(b))
+    update = np.empty(packed_size(b), own.dtype)
     panels = split(n, 1, PANEL)
 
     def strip(first: int) -> None:
         last = min(first + STRIP, b)
         if coupling is None:
-            scaled = np.empty((n, last - first))
+            scaled = np.empty((n, last - first), own.dtype)
         else:
             scaled = coupling[n * first : n * last].reshape(n, last - first)
         for (start, stop), inverse in zip(panels, inverses, strict=True):

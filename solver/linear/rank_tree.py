@@ -8,7 +8,7 @@ likewise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -90,12 +90,17 @@ class RankTree:
         """Memory that a factorisation takes on this rank while it is made."""
         return self.plan.bytes + sum(front.bytes for front in self.fronts)
 
-    def fits(self, share: float) -> bool:
+    def bytes_of(self, dtype: Any) -> int:
+        """The same where the inside of this rank's rows is eliminated in the precision `dtype`."""
+        spared = self.plan.bytes * (8 - np.dtype(dtype).itemsize) // 8
+        return self.bytes - spared
+
+    def fits(self, share: float, dtype: Any = np.float64) -> bool:
         """Whether a factorisation takes at most that share of every machine's free memory.
 
         Collective.
         """
-        available, needed = available_memory(), sum_over_machine(self.comm, self.bytes)
+        available, needed = available_memory(), sum_over_machine(self.comm, self.bytes_of(dtype))
         fits = available is None or needed < share * available
         return bool(self.comm.allreduce(fits, MPI.LAND))
 
@@ -107,12 +112,17 @@ class RankTree:
         needed = sum_over_machine(self.comm, own)
         on_every_rank(self.comm, lambda: require_memory(self._unknowns, needed))
 
-    def inverse(self, system: System, shift: float) -> TreeInverse | Factor:
-        """(K - shift M)^-1; collective. Raises ConvergenceError on every rank if it fails."""
+    def inverse(
+        self, system: System, shift: float, dtype: Any = np.float64
+    ) -> TreeInverse | Factor:
+        """(K - shift M)^-1; collective. Raises ConvergenceError on every rank if it fails.
+
+        Each rank eliminates the inside of its rows in the precision `dtype`.
+        """
         plan, rows = self.plan, system.rows
-        self._require_memory(self.bytes)
+        self._require_memory(self.bytes_of(dtype))
         factor = on_every_rank(
-            self.comm, lambda: Factor(plan, rows.stiffness, rows.mass, shift, rows.threads)
+            self.comm, lambda: Factor(plan, rows.stiffness, rows.mass, shift, rows.threads, dtype)
         )
         if self.comm.size == 1:
             return factor
