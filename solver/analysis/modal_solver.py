@@ -11,14 +11,16 @@ from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import say
-from carillon.fem.model import Solid
+from carillon.errors import ConvergenceError
+from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.processes.memory import reuse_freed_memory
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.corrected import CorrectedModes, Eigenpairs
+from solver.analysis.faster_method import gradients_are_faster
 from solver.analysis.modes import Initial, Modes
-from solver.analysis.options import RANDOM, SolverOptions
+from solver.analysis.options import AUTO, RANDOM, SolverOptions
 from solver.analysis.proof import Phases, ground_truth, prove
 from solver.assembly.system import Layout, System, assemble
 from solver.distribution.collective import bcast_from_root, compute_on_root, share_cores
@@ -42,6 +44,9 @@ class ModalSolver:
         What to compute and how.
     prepared
         Partition and analysis of the same mesh, of use to methods that begin with random vectors.
+    once
+        Whether only one material will be solved for, from coarse modes: then `auto` takes
+        conjugate gradients, which keep nothing for a next one, where they are faster.
 
     Examples
     --------
@@ -59,8 +64,11 @@ class ModalSolver:
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
         prepared: Prepared | None = None,
+        once: bool = False,
     ) -> None:
+        once = once and prepared is None and options.method == options.linear_solver == AUTO
         options = bcast_from_root(comm, lambda: _with_method(options, model))
+        once = once and bcast_from_root(comm, lambda: isinstance(model, ElasticModel))
         self._model = model if comm.rank == 0 else None
         require_memory(model, options, comm)
         self.comm = comm
@@ -86,14 +94,23 @@ class ModalSolver:
             if prepared is None:
                 prepared = Prepared.of_mesh(self.local_mesh, comm, options.linear_solver)
             self._layout, self._linear = prepared.layout, prepared.linear
+            self._is_by_choice = False
             if options.method == "lanczos" and not self._linear.indefinite:
                 options = replace(options, method="lobpcg")
-            report = _reporter(verbose and comm.rank == 0)
-            self._corrected = CorrectedModes(
-                options, self.local_mesh, self._linear, comm, self._threads, report
-            )
-        self.options = options
+            elif once and options.method == "lanczos":
+                n_dofs = self.local_mesh.n_dofs
+                self._is_by_choice = gradients_are_faster(self._linear.tree, n_dofs, options)
+            self._correct_by("lobpcg" if self._is_by_choice else options.method, options)
         self.seconds = phases.seconds
+
+    def _correct_by(self, method: str, options: SolverOptions) -> None:
+        """Correct modes by a method, which `lobpcg` does without a factorisation."""
+        self.options = replace(options, method=method)
+        linear = LinearSolver("amg-cg", self._layout) if self._is_by_choice else self._linear
+        report = _reporter(self._verbose and self.comm.rank == 0)
+        self._corrected = CorrectedModes(
+            self.options, self.local_mesh, linear, self.comm, self._threads, report
+        )
 
     def solve(
         self,
@@ -147,9 +164,15 @@ class ModalSolver:
             pairs = Eigenpairs(*ground_truth(system, options, phases, evidence).lowest())
         else:
             law = partial(self._law, young)
-            pairs = self._corrected.solve(
-                local_mesh, system, initial_modes, similar is not None, law, phases, evidence
-            )
+            arguments = initial_modes, similar is not None, law, phases, evidence
+            try:
+                pairs = self._corrected.solve(local_mesh, system, *arguments)
+            except ConvergenceError as error:
+                if not (self._is_by_choice and error.collective):
+                    raise
+                self._factorise_after(error)
+                evidence["method"] = self.options.method
+                pairs = self._corrected.solve(local_mesh, system, *arguments)
         exact = options.is_general or options.is_corrected
         residuals = prove(system, pairs.values, pairs.vectors, exact, phases, evidence)
         return Modes(
@@ -162,6 +185,12 @@ class ModalSolver:
             pairs.guard,
             pairs.inverse,
         )
+
+    def _factorise_after(self, error: ConvergenceError) -> None:
+        """Go on with a factorisation where the choice of conjugate gradients was a bad one."""
+        say(f"{error}; a factorisation is made", visible=self.comm.rank == 0)
+        self._is_by_choice = False
+        self._correct_by("lanczos", self.options)
 
     def _moduli(self, young: Array | None, coarsened: bool) -> Array:
         model, young = cast(Solid, self._model), cast(Array, young)

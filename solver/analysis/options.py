@@ -21,7 +21,9 @@ from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
 from solver.reference.eigensolver import TYPES
 from solver.reference.truth import RESIDUAL_TOLERANCE
 
-METHODS = ("auto", "hcms", "lanczos", "lobpcg", *TYPES)
+AUTO = "auto"
+"""Name of the choice that is left to the program."""
+METHODS = (AUTO, "hcms", "lanczos", "lobpcg", *TYPES)
 RANDOM = ("lanczos", "lobpcg")
 """Methods that begin with random vectors."""
 MAX_CORRECTIONS = 40
@@ -137,7 +139,7 @@ class SolverOptions:
                     "lanczos"
                 )
             return replace(self, linear_solver="amg-cg")
-        if self.method != "auto":
+        if self.method != AUTO:
             return self
         if strange or n_dofs < LEAST_UNKNOWNS * self.modes:
             return replace(self, method="hcms")

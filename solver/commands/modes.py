@@ -8,7 +8,6 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Any
 
 from mpi4py import MPI
@@ -27,11 +26,13 @@ from solver.accuracy.solving import (
     solve_solid,
 )
 from solver.analysis.coarse_start import coarse_start
+from solver.analysis.faster_method import FEWEST_UNKNOWNS
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Initial
-from solver.analysis.options import SolverOptions
+from solver.analysis.options import AUTO, SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import make_coarsening
+from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import forest_or_reason
 from solver.commands.modes_summary import REFINED, attributes_of, print_json, print_summary
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
@@ -145,11 +146,35 @@ class _FileStart:
 def _beginning(
     arguments: argparse.Namespace, solid: ProblemOptions, comm: MPI.Comm
 ) -> Callable[[ModalSolver, Solid | None], Initial | None] | None:
+    if arguments.initial_modes is not None:
+        return _FileStart(arguments.initial_modes)
+    coarse = _CoarseStart(solid, comm)
     if arguments.refine:
-        forest = partial(forest_or_reason, solid.forest, solid.poisson)
-        coarsening = compute_on_root(comm, lambda: forest()[0] or make_coarsening("galerkin"))
-        return partial(coarse_start, coarsening=coarsening)
-    return None if arguments.initial_modes is None else _FileStart(arguments.initial_modes)
+        return coarse
+    voxels = solid.coarsen == "none" and solid.discretisation == "voxel"
+    return coarse.if_faster if voxels and arguments.method == AUTO else None
+
+
+class _CoarseStart:
+    """Modes of the coarsened solid, to start from."""
+
+    def __init__(self, solid: ProblemOptions, comm: MPI.Comm) -> None:
+        self._solid, self._comm = solid, comm
+
+    def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial:
+        coarsening = compute_on_root(self._comm, self._coarsening)
+        return coarse_start(solver, model, coarsening)
+
+    def if_faster(self, solver: ModalSolver, model: Solid | None) -> Initial | None:
+        """The same for conjugate gradients in a large solid, or else nothing."""
+        large = solver.local_mesh.n_dofs >= FEWEST_UNKNOWNS
+        return self(solver, model) if large and solver.options.method == "lobpcg" else None
+
+    def _coarsening(self) -> Coarsening:
+        forest, _ = forest_or_reason(self._solid.forest, self._solid.poisson)
+        coarsening = forest or make_coarsening("galerkin")
+        assert coarsening is not None
+        return coarsening
 
 
 def _write(solved: Solved, attributes: dict[str, Any], arguments: argparse.Namespace) -> None:

@@ -90,6 +90,17 @@ class RankTree:
         """Memory that a factorisation takes on this rank while it is made."""
         return self.plan.bytes + sum(front.bytes for front in self.fronts)
 
+    def operations(self) -> tuple[float, float]:
+        """Sums and products of a factorisation by all ranks, and of a solve; collective."""
+        factor, solve = self.plan.operations, self.plan.operations_of_solve
+        for front in self.fronts:
+            # Each rank has its share of a front that is swept out: all rows times all pairs.
+            rows = front.own + front.beyond
+            factor += front.own * float(rows) ** 2 / front.comm.size
+            solve += 2.0 * front.own * (front.own + 2.0 * front.beyond) / front.comm.size
+        total = self.comm.allreduce(np.array([factor, solve]))
+        return float(total[0]), float(total[1])
+
     def bytes_of(self, dtype: Any) -> int:
         """The same where the inside of this rank's rows is eliminated in the precision `dtype`."""
         spared = self.plan.bytes * (8 - np.dtype(dtype).itemsize) // 8

@@ -52,12 +52,14 @@ class SolveByOptions:
         """
         options = self.options if modes is None else for_estimate(self.options, modes)
         prepared = None if start is None else start.prepared
-        solver = ModalSolver(model, options, self._comm, self._verbose, prepared)
+        given = self._begin if modes is None and start is None else None
+        once = given is not None
+        solver = ModalSolver(model, options, self._comm, self._verbose, prepared, once)
         begin: Initial | None = None
         if start is not None:
             begin = start.begin(solver)
-        elif self._begin is not None and modes is None:
-            begin = self._begin(solver, model)
+        elif given is not None:
+            begin = given(solver, model)
         result = solver.solve(initial_modes=begin)
         result.seconds = {**solver.seconds, **result.seconds}
         return result
