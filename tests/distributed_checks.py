@@ -410,6 +410,30 @@ def missed_copies_are_found() -> None:
     assert np.abs(gram - np.eye(len(gram))).max() < 1e-9
 
 
+def painted_parts_give_the_bits_of_a_whole_synthesis() -> None:
+    """Materials that follow each other: one part is painted, then Poisson's ratio, then nothing."""
+    model = on_first(solids.random_box(12, 6, 5))
+    options = SolverOptions(modes=16, method="hcms", subdomains=6, corrections=0)
+    random = np.random.default_rng(0)
+    before = random.uniform(1e9, 2e9, 12 * 6 * 5)
+    painted = before.copy()
+    painted[:20] *= 3.0
+    following = ModalSolver(model, options, COMM)
+    for young, poisson in (
+        (before, None),
+        (before, None),
+        (painted, None),
+        (painted, 0.2),
+        (painted, 0.2),
+        (before, 0.2),
+    ):
+        modes = following.solve(young if COMM.rank == 0 else None, poisson=poisson)
+        alone = ModalSolver(model, options, COMM)
+        cold = alone.solve(young if COMM.rank == 0 else None, poisson=poisson)
+        assert (modes.values == cold.values).all()
+        assert (modes.vectors == cold.vectors).all()
+
+
 def multigrid_is_the_same_bits_again() -> None:
     system = assemble(distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM), COMM)
     matrix = system.K.copy()

@@ -35,6 +35,11 @@ def test_ranks_factorise_together(ranks, mpiexec):
 
 
 @pytest.mark.parametrize("ranks", TO_THREE)
+def test_painted_parts_give_the_bits_of_a_whole_synthesis(ranks, mpiexec):
+    mpiexec(ranks, PROGRAM, "painted_parts_give_the_bits_of_a_whole_synthesis", check=True)
+
+
+@pytest.mark.parametrize("ranks", TO_THREE)
 def test_ranks_of_several_machines_solve_count_and_prove_as_those_of_one(ranks, mpiexec):
     names = [
         "mumps_solves_and_counts_what_the_own_factorisation_does",

@@ -12,6 +12,7 @@ from solver.analysis.bounds import default_keep
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import System
 from solver.distribution.local_mesh import LocalMesh
+from solver.hcms.kept_groups import KeptGroups
 from solver.hcms.synthesis import Synthesis, make_subdomains, synthesize
 from solver.reference.truth import SPARE_MODES
 
@@ -33,10 +34,17 @@ class ComponentModes:
         self._comm = comm
         self._keep = _modes_to_keep(local_mesh, options, together)
         self._subdomains = make_subdomains(local_mesh, options.interface, comm)
+        self._kept: list[KeptGroups] = []
 
     def synthesis(self, local_mesh: LocalMesh, threads: int, evidence: dict[str, Any]) -> Synthesis:
-        """Approximate modes of the material on `local_mesh`; `evidence` gets messages and work."""
+        """Approximate modes of the material on `local_mesh`; `evidence` gets messages and work.
+
+        From the third call on, groups of subdomains whose material is that of the call before are
+        not made again: the second shows that materials follow each other.
+        """
         cutoff = self._options.cutoff
+        kept = self._kept[0] if self._kept else None
+        self._kept = self._kept or [KeptGroups()]
         synthesis = synthesize(
             local_mesh,
             self._keep,
@@ -45,6 +53,7 @@ class ComponentModes:
             self._subdomains,
             threads,
             None if cutoff is None else (2.0 * np.pi * cutoff) ** 2,
+            kept,
         )
         evidence["hcms"] = synthesis.counts.summary(self._comm)
         return synthesis

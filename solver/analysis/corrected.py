@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from solver.correction.error_correction import correct
 from solver.correction.random_start import Approximation, LanczosStart, from_nothing
 from solver.distribution.local_mesh import LocalMesh
 from solver.linear import Lasting, LinearSolver
+from solver.reference.single_precision import count_below
 from solver.reference.truth import SPARE_MODES, Truth
 from solver.subspace.rayleigh_ritz import rigid_pairs
 from solver.subspace.weyl import CountingLaw
@@ -139,7 +141,7 @@ class CorrectedModes:
             result.steps,
         )
         if options.check_inertia:
-            count = self._linear.count_below
+            count = partial(count_below, self._linear)
             truth = completed(system, truth, options, phases, evidence, count)
             evidence |= {"further_searches": truth.searches, "modes_added": truth.added}
         return Eigenpairs(*truth.lowest(), result.guard, result.inverse)

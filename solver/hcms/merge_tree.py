@@ -1,5 +1,6 @@
 """The way up the merge tree: every merge by the ranks that the schedule has for it."""
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 from mpi4py import MPI
@@ -10,6 +11,7 @@ from solver.distribution.local_mesh import Cells, LocalMesh
 from solver.distribution.tree import Merge
 from solver.hcms.counts import Counts, Tally
 from solver.hcms.distributed_products import Crew, help_with_products
+from solver.hcms.kept_groups import KeptGroups
 from solver.hcms.merge import (
     Group,
     Interface,
@@ -42,6 +44,10 @@ class Ascent:
     ----------
     groups
         The subdomains of this rank, by number; merged ones are taken out, and the others' put in.
+    kept
+        Groups of the synthesis before; those of this one are put there.
+    unchanged
+        Numbers of the groups that are taken from there.
 
     Attributes
     ----------
@@ -58,6 +64,8 @@ class Ascent:
         cutoff: float | None,
         treatment: str,
         comm: MPI.Comm,
+        kept: KeptGroups | None = None,
+        unchanged: Collection[int] = (),
     ) -> None:
         self.local_mesh = local_mesh
         self.tree = local_mesh.decomposition.tree
@@ -68,6 +76,8 @@ class Ascent:
         self.cutoff = cutoff
         self.treatment = treatment
         self.comm = comm
+        self.kept = kept
+        self.unchanged = unchanged
         self.coefficients: dict[int, tuple[Array, Array]] = {}
         self._sent: list[Sent] = []
 
@@ -79,12 +89,21 @@ class Ascent:
         levels = self.tree.levels()
         for number, step in enumerate(self.tree.merges):
             tally = counts.merges[levels[step.group] - 1]
-            if self.comm.rank in self.plan.ranks_of(number, step):
+            if step.group in self.unchanged:
+                self._take_kept(step.group)
+            elif self.comm.rank in self.plan.ranks_of(number, step):
                 with tally.running():
                     self._merge(step, number, tally)
         with counts.down.running(), counts.down.idle():
             for messages in self._sent:
                 messages.wait()
+
+    def _take_kept(self, group: int) -> None:
+        """Put a merged group of the synthesis before among the groups, if this rank holds it."""
+        kept = self.kept
+        if kept is not None and self.plan.holder[group] == self.comm.rank:
+            self.groups[group] = kept.groups[group]
+            self.coefficients[group] = kept.coefficients[group]
 
     def _merge(self, step: Merge, number: int, tally: Tally) -> None:
         holder, crews = self.plan.holder, self.plan.crews[number]
@@ -193,6 +212,9 @@ class Ascent:
         self.groups[step.group] = join(whole.left, whole.right, values, Q, crew)
         split = len(whole.left.values)
         self.coefficients[step.group] = Q[:split], Q[split:]
+        if self.kept is not None:
+            self.kept.groups[step.group] = self.groups[step.group]
+            self.kept.coefficients[step.group] = self.coefficients[step.group]
 
     def _interface(self, step: Merge, cells: Cells) -> Interface:
         start, middle = self.ranges[step.left]

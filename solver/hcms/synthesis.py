@@ -20,6 +20,7 @@ from solver.distribution.collective import receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh
 from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.counts import Counts, krylov_flops, product_flops
+from solver.hcms.kept_groups import KeptGroups
 from solver.hcms.local import Subdomain
 from solver.hcms.lowest import FEWER_STEPS, STEPS
 from solver.hcms.merge import Group, boundary_of
@@ -69,6 +70,7 @@ def synthesize(
     subdomains: dict[int, Subdomain] | None = None,
     threads: int = 1,
     cutoff: float | None = None,
+    kept: KeptGroups | None = None,
 ) -> Synthesis:
     """Approximate the `keep` lowest modes by merging subdomains pairwise up the tree.
 
@@ -81,6 +83,9 @@ def synthesize(
     cutoff
         Eigenvalue [rad^2/s^2] up to which groups below the root keep their modes, instead of a
         number of them.
+    kept
+        Groups of the synthesis before, of the same mesh with the same options: those whose
+        material is the same are not made again. On return those of this one.
 
     Notes
     -----
@@ -89,10 +94,15 @@ def synthesize(
     """
     if subdomains is None:
         subdomains = make_subdomains(local_mesh, treatment, comm)
-    climb = _Climb(local_mesh, keep, treatment, comm, cutoff)
-    with climb.counts.local.running():
-        climb.solve_subdomains(subdomains, threads)
-    climb.ascent.merge_groups(climb.counts)
+    try:
+        climb = _Climb(local_mesh, keep, treatment, comm, cutoff, kept)
+        with climb.counts.local.running():
+            climb.solve_subdomains(subdomains, threads)
+        climb.ascent.merge_groups(climb.counts)
+    except BaseException:
+        if kept is not None:
+            kept.forget()
+        raise
     with climb.counts.down.running():
         values = climb.root_values()
         weights = climb.push_down()
@@ -103,7 +113,13 @@ def synthesize(
 
 class _Climb:
     def __init__(
-        self, local_mesh: LocalMesh, keep: int, treatment: str, comm: MPI.Comm, cutoff: float | None
+        self,
+        local_mesh: LocalMesh,
+        keep: int,
+        treatment: str,
+        comm: MPI.Comm,
+        cutoff: float | None,
+        kept: KeptGroups | None,
     ) -> None:
         self.local_mesh = local_mesh
         self.keep = keep
@@ -118,32 +134,46 @@ class _Climb:
         self.counts = Counts(self.tree.levels()[-1])
         self.groups: dict[int, Group] = {}
         self.bases: dict[int, Array] = {}
-        self.ascent = Ascent(local_mesh, plan, self.groups, keep, cutoff, treatment, comm)
+        own = local_mesh.decomposition.subdomains_of(comm.rank)
+        self.cells = {
+            part: local_mesh.cells.take(cells)
+            for part, cells in local_mesh.cells_by_subdomain(own).items()
+        }
+        self.kept, unchanged = kept, frozenset[int]()
+        if kept is not None:
+            elements = {part: cells.elements for part, cells in self.cells.items()}
+            unchanged = kept.unchanged(elements, self.tree, comm)
+        self.unchanged = unchanged
+        self.ascent = Ascent(
+            local_mesh, plan, self.groups, keep, cutoff, treatment, comm, kept, unchanged
+        )
 
     def solve_subdomains(self, subdomains: dict[int, Subdomain], threads: int) -> None:
         """Lowest modes of every subdomain of this rank."""
-        cells_of = self.local_mesh.cells_by_subdomain(
-            self.local_mesh.decomposition.subdomains_of(self.comm.rank)
-        )
-
         steps = local_steps(self.tree.parts)
 
         def solve(part: int) -> tuple[Array, Array]:
-            elements = self.local_mesh.cells.take(cells_of[part]).elements
+            elements = self.cells[part].elements
             return subdomains[part].modes(elements, self._count(part), self._cutoff(part), steps)
 
         # The largest first, so that no thread is left with one at the end.
-        order = sorted(subdomains, key=lambda part: self.ranges[part][0] - self.ranges[part][1])
+        changed = [part for part in subdomains if part not in self.unchanged]
+        order = sorted(changed, key=lambda part: self.ranges[part][0] - self.ranges[part][1])
         modes = dict(zip(order, in_parallel(solve, [(part,) for part in order], threads)))
+        kept = self.kept
         for part in sorted(subdomains):
+            if part in self.unchanged and kept is not None:
+                self.bases[part], self.groups[part] = kept.bases[part], kept.groups[part]
+                continue
             start, stop = self.ranges[part]
-            cells = self.local_mesh.cells.take(cells_of[part])
             values, basis = modes[part]
             self.counts.local.flops += krylov_flops(3 * (stop - start), len(values), steps)
-            boundary, crossing = boundary_of(cells, start, stop)
+            boundary, crossing = boundary_of(self.cells[part], start, stop)
             rows = np.ascontiguousarray(basis[degrees_of_freedom(boundary - start)])
             self.bases[part] = basis
             self.groups[part] = Group(start, stop, values, boundary, rows, crossing)
+            if kept is not None:
+                kept.bases[part], kept.groups[part] = basis, self.groups[part]
 
     def _count(self, group: int) -> int:
         start, stop = self.ranges[group]

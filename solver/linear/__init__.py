@@ -141,10 +141,7 @@ class LinearSolver:
 
     def count_below(self, system: System, value: float) -> int:
         """Eigenvalues of K - value M below zero, by inertia; collective."""
-        from solver.linear.single_precision import count_in_single
-
-        count = count_in_single(self.tree, system, value)
-        return self.tree.count_below(system, value) if count is None else count
+        return self.tree.count_below(system, value)
 
     @property
     def indefinite(self) -> bool:

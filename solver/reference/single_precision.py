@@ -4,18 +4,12 @@ It takes half the time of one in double precision, and counts the eigenvalues of
 differs from A = K - value M by rounding.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from solver.assembly.system import System
+from solver.linear import Inverse, LinearSolver
 from solver.linear.rank_tree import RankTree
 from solver.subspace.start import start_block
-
-if TYPE_CHECKING:
-    from solver.assembly.system import System
-    from solver.linear import Inverse
 
 WORTHWHILE = 1e11
 """Least number of operations of a factorisation at which the proof takes less time than it
@@ -26,6 +20,15 @@ LARGEST_DEVIATION = 0.25
 """Largest spectral radius of I - F^-1 A, as estimated, with which the count stands."""
 PROBES, ROUNDS = 4, 5
 """Number of random vectors, and of steps of the power iteration that estimates it."""
+
+
+def count_below(linear: LinearSolver, system: System, value: float) -> int:
+    """Eigenvalues of K - value M below zero, by inertia, as fast as that can be proved; collective.
+
+    Raises ConvergenceError on every rank if the factorisation fails.
+    """
+    count = count_in_single(linear.tree, system, value)
+    return linear.count_below(system, value) if count is None else count
 
 
 def count_in_single(tree: RankTree, system: System, value: float) -> int | None:

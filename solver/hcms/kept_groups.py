@@ -1,0 +1,61 @@
+"""Groups of subdomains whose material is that of the synthesis before: their modes are kept.
+
+Where one part of a solid is painted, the subdomains there are solved and merged anew, and what they
+are merged into up to the root.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from mpi4py import MPI
+
+from carillon.arrays import Array
+from carillon.fem.elements import Elements
+from solver.distribution.tree import MergeTree
+from solver.hcms.merge import Group
+
+
+@dataclass
+class KeptGroups:
+    """What this rank made in the synthesis before, by the number of the group."""
+
+    young: dict[int, Array] = field(default_factory=dict)
+    """Moduli [Pa] of the cells that touch each subdomain of this rank."""
+    bases: dict[int, Array] = field(default_factory=dict)
+    """Modes of each of them."""
+    groups: dict[int, Group] = field(default_factory=dict)
+    """Subdomains, and merged groups that this rank holds."""
+    coefficients: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    """Coefficients of the merges that made these, split between left and right."""
+    poisson: float | None = None
+
+    def forget(self) -> None:
+        """Keep nothing: a synthesis that failed has made some of its groups."""
+        for each in (self.young, self.bases, self.groups, self.coefficients):
+            each.clear()
+
+    def unchanged(
+        self, elements: dict[int, Elements], tree: MergeTree, comm: MPI.Comm
+    ) -> frozenset[int]:
+        """Groups, subdomains among them, that are as they were; the same on every rank.
+
+        Collective. `elements` are those that touch each subdomain of this rank; the next call
+        compares with them.
+        """
+        poisson = next(iter(elements.values())).poisson if elements else self.poisson
+        same = [
+            part
+            for part, each in elements.items()
+            if poisson == self.poisson
+            and part in self.young
+            and np.array_equal(each.young, self.young[part])
+        ]
+        self.young = {part: each.young for part, each in elements.items()}
+        self.poisson = poisson
+        result = {part for parts in comm.allgather(same) for part in parts}
+        for merge in tree.merges:
+            if merge.left in result and merge.right in result:
+                result.add(merge.group)
+        return frozenset(result)
