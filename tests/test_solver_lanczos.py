@@ -200,3 +200,17 @@ def test_a_nearly_void_cell_is_solved_and_a_cut_through_the_body_refused():
     apart = fine_model(mesh, np.where(np.abs(across - across.mean()) < 0.006, 1.0, 1e9))
     with pytest.raises(ConvergenceError, match="zero-frequency modes found, .* has 6"):
         ModalSolver(apart, options, COMM).solve()
+
+
+@pytest.mark.parametrize("modes", [30, 60])
+def test_materials_that_move_far_from_the_first_are_followed(modes):
+    """The inverse of the first material serves as long as it gets on; then it is made anew."""
+    model = solids.random_box(16, 8, 6)
+    solver = ModalSolver(model, SolverOptions(modes=modes, tolerance=1e-2))
+    found = None
+    for step in range(6):
+        young = np.full(model.mesh.n_cells, 1e9)
+        young[: len(young) // 5] *= 1.5**step
+        found = solver.solve(young, initial_modes=found)
+    cold = ModalSolver(model, SolverOptions(modes=modes, tolerance=1e-9)).solve(young)
+    np.testing.assert_allclose(found.values[6:], cold.values[6:], rtol=1e-2)
