@@ -27,8 +27,8 @@ class Tree:
         return 17.0 * self._n_dofs**2, 8.2 * self._n_dofs ** (4.0 / 3.0) * 10.0
 
 
-def is_faster(n_dofs: int, **options: float) -> bool:
-    return gradients_are_faster(Tree(n_dofs), n_dofs, SolverOptions(**options))
+def is_faster(n_dofs: int, from_coarse: bool = True, **options: float) -> bool:
+    return gradients_are_faster(Tree(n_dofs), n_dofs, SolverOptions(**options), from_coarse)
 
 
 def test_more_unknowns_and_fewer_modes_speak_for_conjugate_gradients():
@@ -39,6 +39,8 @@ def test_more_unknowns_and_fewer_modes_speak_for_conjugate_gradients():
     assert modes == sorted(modes, reverse=True) and modes[0] and not modes[-1]
     tolerances = [is_faster(150_000, modes=64, tolerance=10.0**-d) for d in range(2, 13)]
     assert tolerances == sorted(tolerances, reverse=True)
+    size = {"n_dofs": 250_000, "modes": 64, "tolerance": 1e-6}
+    assert is_faster(**size) and not is_faster(from_coarse=False, **size)
     assert not is_faster(FEWEST_UNKNOWNS - 1, modes=10, tolerance=1e-2)
 
 

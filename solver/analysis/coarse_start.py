@@ -37,7 +37,7 @@ def coarse_start(
     options = SolverOptions(
         modes=requested + default_guard(requested), tolerance=TOLERANCE, seed=solver.options.seed
     )
-    modes = ModalSolver(coarse, options, comm).solve()
+    modes = ModalSolver(coarse, options, comm, once=True).solve()
     whole = modes.system.gather(modes.vectors[:, RIGID_MODES:])
     modes.destroy()
     values = modes.values[RIGID_MODES:]

@@ -23,15 +23,17 @@ SETUP, STEP = 1.4e-5, 4e-8
 products."""
 WIDTH = 80
 """Number of vectors at which the products of all of them take as long as that."""
-STEPS_A_DECADE, FIRST_STEPS, FEWEST_STEPS = 1.7, 1.5, 3.0
-"""Steps for each decade of the tolerance, less the first ones from coarse modes; at least so
-many."""
+STEPS_A_DECADE, FROM_COARSE, FROM_RANDOM, FEWEST_STEPS = 1.7, -1.5, 3.0, 3.0
+"""Steps for each decade of the tolerance, and beyond that from coarse modes and from random
+vectors; at least so many."""
 
 
-def gradients_are_faster(tree: RankTree, n_dofs: int, options: SolverOptions) -> bool:
-    """Whether LOBPCG from coarse modes is expected to be clearly faster than block Lanczos.
+def gradients_are_faster(
+    tree: RankTree, n_dofs: int, options: SolverOptions, from_coarse: bool
+) -> bool:
+    """Whether LOBPCG is expected to be clearly faster than block Lanczos; collective.
 
-    Collective.
+    It starts from random vectors, or from coarse modes.
     """
     if n_dofs < FEWEST_UNKNOWNS:
         return False
@@ -39,6 +41,7 @@ def gradients_are_faster(tree: RankTree, n_dofs: int, options: SolverOptions) ->
     lanczos = FACTOR * factor + SOLVE * (SOLVES_A_MODE * options.modes + SOLVES) * solve
     tolerance = EIGENVALUE_TOLERANCE if options.tolerance is None else options.tolerance
     width = options.modes + default_guard(options.modes)
-    steps = max(FEWEST_STEPS, STEPS_A_DECADE * -log10(tolerance) - FIRST_STEPS)
+    first = FROM_COARSE if from_coarse else FROM_RANDOM
+    steps = max(FEWEST_STEPS, STEPS_A_DECADE * -log10(tolerance) + first)
     solves = STEP * steps * width * (1.0 + width / WIDTH)
     return n_dofs * (SETUP + solves) < CLEARLY_LESS * lanczos

@@ -82,7 +82,7 @@ def solve(
     True
     """
     solid = compute_on_root(comm, lambda: _with_material(model, material))
-    solver = ModalSolver(solid, SolverOptions(modes=modes, **options), comm)
+    solver = ModalSolver(solid, SolverOptions(modes=modes, **options), comm, once=True)
     whole = initial_modes.modes if isinstance(initial_modes, Solution) else initial_modes
     count = bcast_from_root(comm, lambda: _columns(whole, solid, modes))
     rows = None

@@ -45,8 +45,10 @@ class ModalSolver:
     prepared
         Partition and analysis of the same mesh, of use to methods that begin with random vectors.
     once
-        Whether only one material will be solved for, from coarse modes: then `auto` takes
-        conjugate gradients, which keep nothing for a next one, where they are faster.
+        Whether only one material will be solved for: then `auto` takes conjugate gradients, which
+        keep nothing for a next one, where they are faster.
+    from_coarse
+        Whether they will be given coarse modes to start from.
 
     Examples
     --------
@@ -65,6 +67,7 @@ class ModalSolver:
         verbose: bool = False,
         prepared: Prepared | None = None,
         once: bool = False,
+        from_coarse: bool = False,
     ) -> None:
         once = once and prepared is None and options.method == options.linear_solver == AUTO
         options = bcast_from_root(comm, lambda: _with_method(options, model))
@@ -98,8 +101,8 @@ class ModalSolver:
             if options.method == "lanczos" and not self._linear.indefinite:
                 options = replace(options, method="lobpcg")
             elif once and options.method == "lanczos":
-                n_dofs = self.local_mesh.n_dofs
-                self._is_by_choice = gradients_are_faster(self._linear.tree, n_dofs, options)
+                size = self._linear.tree, self.local_mesh.n_dofs
+                self._is_by_choice = gradients_are_faster(*size, options, from_coarse)
             self._correct_by("lobpcg" if self._is_by_choice else options.method, options)
         self.seconds = phases.seconds
 
@@ -229,7 +232,7 @@ def modal_analysis(
 
     The seconds of the result hold those of the preparation too.
     """
-    prepared = ModalSolver(model, options, comm)
+    prepared = ModalSolver(model, options, comm, once=True)
     modes = prepared.solve()
     return replace(modes, seconds={**prepared.seconds, **modes.seconds})
 

@@ -53,8 +53,15 @@ class SolveByOptions:
         options = self.options if modes is None else for_estimate(self.options, modes)
         prepared = None if start is None else start.prepared
         given = self._begin if modes is None and start is None else None
-        once = given is not None
-        solver = ModalSolver(model, options, self._comm, self._verbose, prepared, once)
+        solver = ModalSolver(
+            model,
+            options,
+            self._comm,
+            self._verbose,
+            prepared,
+            once=start is None,
+            from_coarse=given is not None,
+        )
         begin: Initial | None = None
         if start is not None:
             begin = start.begin(solver)
