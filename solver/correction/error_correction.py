@@ -140,10 +140,19 @@ def _by_gradients(
         return _whole(values[:width], vectors[:, :width], requested)
     inverse = linear.iterative(system, -safe_shift(system))
     try:
-        if start is None:
-            start = inverse.precondition(system.times_mass(start_block(system, width, 0)))
-        start = start[:, :width]
-        return lobpcg(system, inverse.precondition, start, requested, tolerance, max_steps, report)
+        precondition = inverse.precondition
+        return lobpcg(
+            system,
+            precondition,
+            # Nothing here holds the random vectors while the iteration goes on.
+            precondition(system.times_mass(start_block(system, width, 0)))
+            if start is None
+            else start[:, :width],
+            requested,
+            tolerance,
+            max_steps,
+            report,
+        )
     finally:
         inverse.destroy()
 

@@ -53,14 +53,15 @@ def lobpcg(
     theta_m / (theta_m - theta) times r^T K^-1 r, for which the preconditioner stands; should it be
     too small, what the last step took off the value tells.
     """
-    values, vectors = rayleigh_ritz(system, start)
-    if len(values) < requested:
+    basis = TrialSpace(system, *rayleigh_ritz(system, start))
+    del start  # as large as the modes
+    count = len(basis.values)
+    if count < requested:
         raise ConvergenceError(
-            f"the start block spans {len(values)} elastic modes, {requested} are wanted; keep more"
+            f"the start block spans {count} elastic modes, {requested} are wanted; keep more"
         )
-    basis = TrialSpace(system, values, vectors)
-    errors, before = np.full(len(values), np.inf), np.full(len(values), np.inf)
-    active = np.arange(len(values))
+    errors, before = np.full(count, np.inf), np.full(count, np.inf)
+    active = np.arange(count)
     history: list[float] = []
     solves = 0
     for step in range(max_steps + 1):

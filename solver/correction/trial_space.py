@@ -18,7 +18,7 @@ from solver.subspace.rayleigh_ritz import reduced_eigenpairs
 
 ROWS_AT_ONCE = 2048
 """Number of rows of the basis that are multiplied together and written back."""
-COLUMNS_AT_ONCE = 32
+COLUMNS_AT_ONCE = 16
 """Number of columns whose products with K and M exist at a time."""
 
 
