@@ -10,6 +10,7 @@ import pytest
 from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
 from solver.files.modes_file import read_modes
 from tests.edited_files import edited
+from workflow.commands.digest import digest
 
 BAR = ("builtin:bar", "--resolution", "16")
 
@@ -46,6 +47,18 @@ def test_modes_file_is_complete(modes_file):
         assert all(
             dataset.fletcher32 for dataset in raw.values() if isinstance(dataset, h5py.Dataset)
         )
+
+
+def test_phases_are_told_and_leave_no_trace_in_the_file(modes_file, run_cli, tmp_path):
+    out = tmp_path / "modes.h5"
+    words = ("--material", "two-region", "--modes", "30", "--out", out, "--phases")
+    lines = run_cli("solver", "modes", *BAR, *words, check=True).stdout.splitlines()
+    expected = (
+        "phase start solid partition analysis assembly lanczos correction verification estimate "
+        "writing other"
+    )
+    assert [line.split()[0] for line in lines[-12:]] == expected.split()
+    assert digest(out) == digest(modes_file)
 
 
 @pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])

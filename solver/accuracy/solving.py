@@ -17,10 +17,11 @@ from solver.accuracy.divide import DividedCells, solve_refined
 from solver.accuracy.voxels import Reference
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
+from solver.analysis.phases import RankClock
 from solver.analysis.problem import Problem, ProblemOptions, build_problem
 from solver.analysis.solid_surface import SolidSurface
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
-from solver.files.modes_file import FINE_TAKEN, read_modes
+from solver.files.modes_file import ESTIMATE, FINE_TAKEN, read_modes
 from solver.refinement.coarse_or_fine import solve_coarsened
 from solver.refinement.errors import (
     DIVIDED_CELLS,
@@ -43,6 +44,8 @@ LEAST_STEP, LARGEST_STEP = 1.2, 2.0
 """Least and largest factor by which a resolution is raised."""
 FIRST_RESOLUTION = 16
 """First resolution of a search for an accurate one."""
+SOLID = "solid"
+"""Phase in which rank 0 reads the mesh, assigns the material and coarsens."""
 
 
 @dataclass
@@ -82,13 +85,15 @@ def solve_solid(
     request: AccuracyRequest,
     comm: MPI.Comm = MPI.COMM_WORLD,
     report: Callable[[RefinementStep], None] | None = None,
+    clock: RankClock | None = None,
 ) -> Solved:
     """Modes of a solid, as accurate as requested, and their expected errors; collective.
 
-    `solve` finds the modes of a model by the `options`, which coarse models are weighed by. Raises
-    UserError for anything wrong with the solid, and if it would be too large to be so accurate.
+    `solve` finds the modes of a model by the `options`, which coarse models are weighed by. The
+    `clock` of the run counts what is done besides. Raises UserError for anything wrong with the
+    solid, and if it would be too large to be so accurate.
     """
-    search = _Search(solve, options, request, comm, report)
+    search = _Search(solve, options, request, comm, report, clock or RankClock(comm))
     solved = search.solved(solid)
     while (resolution := search.resolution_after(solved)) is not None:
         solved.modes.destroy()
@@ -104,10 +109,12 @@ class _Search:
     request: AccuracyRequest
     comm: MPI.Comm
     report: Callable[[RefinementStep], None] | None
+    clock: RankClock
 
     def solved(self, solid: ProblemOptions, surface: SolidSurface | None = None) -> Solved:
         """Modes at one resolution; the surface on rank 0 if it was read before."""
-        problem = compute_on_root(self.comm, lambda: build_problem(solid, surface))
+        with self.clock(SOLID):
+            problem = compute_on_root(self.comm, lambda: build_problem(solid, surface))
         estimated, tolerance = self.request.estimated, self.request.refine_to
         cells = solid.discretisation == "finite-cell"
         if tolerance is None and cells and estimated:
@@ -121,7 +128,8 @@ class _Search:
             solved = self._coarsened(solid, problem, tolerance)
         if estimated and solid.discretisation == "voxel":
             distance = partial(self._distance_of_voxels, solved)
-            solved.achieved |= optional(self.comm, UNTOLD, distance) or {}
+            with self.clock(ESTIMATE):
+                solved.achieved |= optional(self.comm, UNTOLD, distance) or {}
         return solved
 
     @on_all_ranks()

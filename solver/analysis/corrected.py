@@ -13,7 +13,8 @@ from carillon.fem.model import RIGID_MODES
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions
-from solver.analysis.proof import Phases, completed
+from solver.analysis.phases import Phases
+from solver.analysis.proof import completed
 from solver.assembly.system import System
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, accurate_count, carried_count
 from solver.correction.error_correction import correct

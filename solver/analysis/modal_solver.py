@@ -21,7 +21,8 @@ from solver.analysis.corrected import CorrectedModes, Eigenpairs
 from solver.analysis.faster_method import gradients_are_faster
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import AUTO, RANDOM, SolverOptions
-from solver.analysis.proof import Phases, ground_truth, prove
+from solver.analysis.phases import Phases, RankClock
+from solver.analysis.proof import ground_truth, prove
 from solver.assembly.system import Layout, System, assemble
 from solver.distribution.collective import bcast_from_root, compute_on_root, share_cores
 from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
@@ -49,6 +50,8 @@ class ModalSolver:
         keep nothing for a next one, where they are faster.
     from_coarse
         Whether they will be given coarse modes to start from.
+    clock
+        Clock of the run, to which the phases are added, if there is one.
 
     Examples
     --------
@@ -66,6 +69,7 @@ class ModalSolver:
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
         prepared: Prepared | None = None,
+        clock: RankClock | None = None,
         once: bool = False,
         from_coarse: bool = False,
     ) -> None:
@@ -76,10 +80,11 @@ class ModalSolver:
         require_memory(model, options, comm)
         self.comm = comm
         self._verbose = verbose
+        self._clock = clock
         self._threads = share_cores(comm)
         leave_cores(comm)
         reuse_freed_memory()
-        phases = Phases(comm, verbose)
+        phases = Phases(comm, verbose, clock)
         if options.method not in RANDOM or options.linear_solver != "auto":
             prepared = None
         with phases("partition"):
@@ -142,7 +147,7 @@ class ModalSolver:
             Whether `young` (m, 8) is what a coarsening made, which may lie beyond the limits of
             moduli that users give.
         """
-        options, phases = self.options, Phases(self.comm, self._verbose)
+        options, phases = self.options, Phases(self.comm, self._verbose, self._clock)
         with phases("assembly"):
             local_mesh = self.local_mesh
             if self.comm.bcast(young is not None):

@@ -30,11 +30,18 @@ from solver.analysis.faster_method import FEWEST_UNKNOWNS
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Initial
 from solver.analysis.options import AUTO, SolverOptions
+from solver.analysis.phases import RankClock
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import forest_or_reason
-from solver.commands.modes_summary import REFINED, attributes_of, print_json, print_summary
+from solver.commands.modes_summary import (
+    REFINED,
+    attributes_of,
+    phase_table,
+    print_json,
+    print_summary,
+)
 from solver.commands.running import add_solid, on_ranks, parameters, require_outputs
 from solver.distribution.collective import compute_on_root
 from solver.files.initial_modes import modes_from_file
@@ -48,6 +55,8 @@ EXAMPLES = """examples:
   modes bunny.obj --resolution 48 --material two-region --coarsen ddfem --modes 60 --out bunny.h5
   modes bunny.obj --resolution 48 --method slepc --modes 60 --out truth.h5
 """
+WRITING = "writing"
+"""Phase that writes the modes file."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,24 +85,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='options for PETSc and SLEPc with the prefix carillon_, as in "-carillon_eps_ncv 400"',
     )
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
+    parser.add_argument(
+        "--phases",
+        action="store_true",
+        help="print what the busiest rank took in each phase; --json tells it of all ranks",
+    )
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Build the solid, solve, verify, write."""
     with on_ranks(arguments.petsc) as comm:
+        clock = RankClock.of_process(comm)
         require_outputs(arguments, comm)
         solid, solver, accuracy = _options(arguments)
         petsc_options.insert_options(arguments.petsc, solver.method)
         begin = _beginning(arguments, solid, comm)
-        solve = SolveByOptions(solver, comm, sys.stderr.isatty(), begin)
+        solve = SolveByOptions(solver, comm, sys.stderr.isatty(), begin, clock)
         start = time.perf_counter()
-        solved = solve_solid(solid, solve, solver, accuracy, comm, _report)
+        solved = solve_solid(solid, solve, solver, accuracy, comm, _report, clock)
         attributes = attributes_of(solved, solver, accuracy, time.perf_counter() - start)
-        _write(solved, attributes, arguments)
+        with clock(WRITING):
+            _write(solved, attributes, arguments)
+        by_rank = clock.by_rank()
         if comm.rank == 0:
             _warn_about_options()
-            show = print_json if arguments.json else print_summary
-            show(attributes, solved, arguments.out)
+            if arguments.json:
+                print_json(attributes, solved, arguments.out, by_rank)
+                return
+            print_summary(attributes, solved, arguments.out)
+            if arguments.phases:
+                print(phase_table(by_rank))
 
 
 @on_all_ranks()

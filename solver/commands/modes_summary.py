@@ -6,6 +6,7 @@ from typing import Any
 from carillon.fem.geometry.size import sizes_in_words
 from solver.accuracy.solving import AccuracyRequest, Solved
 from solver.analysis.options import SolverOptions
+from solver.analysis.phases import ByRank
 from solver.files.modes_file import ESTIMATE, FINE_TAKEN, frequencies
 from solver.refinement.errors import DIVIDED_CELLS, FINE_BLOCKS, FROM_FINE, FROM_SOLID, in_words
 
@@ -50,8 +51,8 @@ def attributes_of(
     return attributes
 
 
-def print_json(attributes: dict[str, Any], solved: Solved, out: str) -> None:
-    """Print attributes, sizes and frequencies as one JSON object."""
+def print_json(attributes: dict[str, Any], solved: Solved, out: str, by_rank: ByRank) -> None:
+    """Print attributes, sizes, frequencies and what each rank took as one JSON object."""
     assert solved.problem is not None
     summary = {
         **attributes,
@@ -59,6 +60,7 @@ def print_json(attributes: dict[str, Any], solved: Solved, out: str) -> None:
         "voxel_extents_m": solved.problem.voxel_extents,
         "frequencies_hz": frequencies(solved.modes.values).tolist(),
         "out": out,
+        "phases_by_rank": by_rank,
     }
     print(json.dumps(summary))
 
@@ -99,3 +101,28 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
             f"{100 * attributes['missed_accuracy']:g}% rms was aimed at, which dividing some cells "
             "does not reach: raise --resolution"
         )
+
+
+def phase_table(by_rank: ByRank) -> str:
+    """Lines for people: of each phase what the ranks took on average, and the busiest one.
+
+    Examples
+    --------
+    >>> took = {"seconds": [2.0, 2.0], "processor_seconds": [1.0, 2.0]}
+    >>> took |= {"waiting_seconds": [1.0, 0.0], "peak_memory_bytes": [1e9, 2e9]}
+    >>> print(phase_table({"assembly": took}))
+    phase          seconds  processor seconds: mean, most  of rank  ratio  waiting, most  memory
+    assembly          2.00                     1.50  2.00        1   1.33           1.00  2.0 GB
+    """
+    head = "seconds  processor seconds: mean, most  of rank  ratio  waiting, most  memory"
+    lines = [f"{'phase':<14} {head}"]
+    for name, took in by_rank.items():
+        busy = took["processor_seconds"]
+        most, mean = max(busy), sum(busy) / len(busy)
+        ratio = f"{most / mean:.2f}" if mean else "-"
+        lines.append(
+            f"{name:<14} {max(took['seconds']):7.2f}  {mean:23.2f} {most:5.2f}  "
+            f"{busy.index(most):7d}  {ratio:>5}  {max(took['waiting_seconds']):13.2f}"
+            f"  {max(took['peak_memory_bytes']) / 1e9:3.1f} GB"
+        )
+    return "\n".join(lines)

@@ -19,7 +19,7 @@ from solver.linear import petsc_options
 
 INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
 """Arguments that name input files of a command."""
-HIDDEN = ("out", "pictures", "json")
+HIDDEN = ("out", "pictures", "json", "phases")
 """Arguments that do not change a result."""
 
 

@@ -9,10 +9,13 @@ from carillon.fem.model import Solid
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions
+from solver.analysis.phases import RankClock
 from solver.refinement.inverse_iteration import FineStart
 
 ESTIMATE_TOLERANCE = 1e-4
 """Relative error of the eigenvalues with which those of voxels are compared."""
+INITIAL = "initial modes"
+"""Phase that finds what an analysis starts from."""
 
 SolveModel = Callable[..., Modes]
 """Finds the modes of one model after another, as `SolveByOptions` does."""
@@ -21,7 +24,8 @@ SolveModel = Callable[..., Modes]
 class SolveByOptions:
     """Finds modes as options say.
 
-    `begin` gives what the analysis of a model starts from, but for models of an estimate.
+    `begin` gives what the analysis of a model starts from, but for models of an estimate. The run
+    that they belong to may have a `clock`.
     """
 
     def __init__(
@@ -30,8 +34,10 @@ class SolveByOptions:
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
         begin: Callable[[ModalSolver, Solid | None], Initial | None] | None = None,
+        clock: RankClock | None = None,
     ) -> None:
         self.options = options
+        self._clock = RankClock(comm) if clock is None else clock
         self._comm = comm
         self._verbose = verbose
         self._begin = begin
@@ -59,14 +65,17 @@ class SolveByOptions:
             self._comm,
             self._verbose,
             prepared,
+            self._clock,
             once=start is None,
             from_coarse=given is not None,
         )
         begin: Initial | None = None
         if start is not None:
-            begin = start.begin(solver)
+            with self._clock(INITIAL):
+                begin = start.begin(solver)
         elif given is not None:
-            begin = given(solver, model)
+            with self._clock(INITIAL):
+                begin = given(solver, model)
         result = solver.solve(initial_modes=begin)
         result.seconds = {**solver.seconds, **result.seconds}
         return result
