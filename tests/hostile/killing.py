@@ -94,7 +94,7 @@ def kill_and_repeat(killed: Killed, folder: Path, moment: float) -> dict[str, st
         run.wait(moment)
     _kill(killed, run, mark)
     run.wait()
-    _require_none_left(mark)
+    require_none_left(mark)
     _finish(killed, folder)
     unfinished = [path for path in folder.rglob("*") if _is_unfinished(path)]
     assert not unfinished, f"left behind: {unfinished}"
@@ -171,7 +171,7 @@ def _finish(killed: Killed, folder: Path) -> None:
         output, _ = run.communicate()
         raise AssertionError(f"no end after {HANG_SECONDS:g} s:\n{output[-4000:]}") from None
     assert run.returncode == 0, f"exit status {run.returncode}:\n{output[-4000:]}"
-    _require_none_left(mark)
+    require_none_left(mark)
 
 
 def _kill(killed: Killed, run: subprocess.Popen[str], mark: str) -> None:
@@ -195,7 +195,14 @@ def _kill_all(mark: str) -> None:
         time.sleep(0.01)
 
 
-def _require_none_left(mark: str) -> None:
+def require_none_left(mark: str) -> None:
+    """Wait until the last process has ended whose environment has the mark, see `MARK`.
+
+    Raises
+    ------
+    AssertionError
+        If one does not end by itself; it is killed.
+    """
     until = time.monotonic() + ORPHAN_SECONDS
     while left := list(_marked(mark)):
         if time.monotonic() > until:
