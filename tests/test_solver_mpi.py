@@ -13,7 +13,8 @@ from tests.rank_counts import SEVERAL, TO_THREE
 pytestmark = pytest.mark.mpi
 
 PROGRAM = Path(__file__).with_name("distributed_checks.py")
-MODEL = ("builtin:bar", "--resolution", "24", "--material", "smooth", "--subdomains", "7")
+SOLID = ("builtin:bar", "--resolution", "24", "--material", "smooth")
+MODEL = (*SOLID, "--subdomains", "7")
 MODES = ("--modes", "50")
 
 
@@ -68,6 +69,16 @@ def test_corrected_modes_on_any_number_of_ranks(ranks, linear_solver, truth, tmp
     assert comparison.eigenvalue_relative_error["max"] < 1e-10
     assert comparison.subspace_angle_max < 1e-4
     assert read_modes(out).attributes["ranks"] == ranks
+
+
+@pytest.mark.parametrize("method", ["auto", "hcms"])
+@pytest.mark.parametrize("ranks", [*TO_THREE, pytest.param(4, marks=pytest.mark.nightly)])
+def test_a_tight_tolerance_is_met_on_1_to_4_ranks(ranks, method, truth, tmp_path, mpiexec):
+    out = tmp_path / "modes.h5"
+    options = ("--method", method, "--tol", "1e-11", "--no-estimate", "--out", out)
+    mpiexec(ranks, "solver", "modes", *SOLID, *MODES, *options, check=True)
+    assert read_modes(out).attributes["method"] == {"auto": "lanczos"}.get(method, method)
+    assert compare_files(out, truth).eigenvalue_relative_error["max"] < 1e-9
 
 
 @pytest.mark.nightly
