@@ -104,6 +104,22 @@ def test_mpiexec_starts_ranks_that_find_each_other_on_two_nodes(cluster, tmp_pat
     assert read_modes(str(tmp_path / "modes.h5")).attributes["ranks"] == 2
 
 
+def test_modes_are_proved_on_three_nodes_as_on_one_machine(cluster, tmp_path, mpiexec):
+    """The count below the last mode, the modes and all evidence, on one thread a rank."""
+    solid = "builtin:bar --resolution 24 --material two-region".split()
+    words = [*solid, "--modes", "30", "--check-inertia", "--no-estimate", "--out"]
+    mpiexec(RANKS, "carillon", "modes", *words, tmp_path / "here.h5", check=True)
+    program = f"{sys.executable} -m mpi4py -m carillon modes {' '.join(words)} nodes.h5"
+    command = f"OMP_NUM_THREADS=1 srun --mpi=pmix {program}"
+    before = len(cluster.ended())
+    slurm_cluster.batch(tmp_path, f"--wrap={command}", options=ONE_RANK_EACH)
+    assert nodes_of(cluster.ended()[before:]) == ["n[1-3]"]
+    proved = read_modes(tmp_path / "nodes.h5").attributes
+    assert proved["ranks"] == RANKS and proved["threads"] == 1
+    assert proved["inertia_count"] == proved["inertia_expected"] >= 30
+    assert digest(tmp_path / "nodes.h5") == digest(tmp_path / "here.h5")
+
+
 def test_shards_of_an_array_are_those_of_one_process(cluster, here, tmp_path):
     before = len(cluster.ended())
     slurm_cluster.batch(
