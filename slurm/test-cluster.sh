@@ -16,6 +16,8 @@
 #   slurm/test-cluster.sh unplug | plug FOLDER NODE      its link to the others
 #   slurm/test-cluster.sh on FOLDER NODE COMMAND...      a command on it, in the same folder
 #
+# slurm/delayed_links.py adds links between them on which messages take their time.
+#
 # `start FOLDER --while PROCESS` stops the cluster when that process has ended, by whatever hand.
 # Everything is written in FOLDER, but for a link /etc/slurm/slurm.conf while it runs; a machine
 # that has a SLURM of its own is left alone. CPUS and MEMORY_MB in the environment say what each node

@@ -1,5 +1,6 @@
 """On three nodes, with messages and files between them: the same bits as on one machine."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 from solver.files.modes_file import read_modes
 from tests import slurm_cluster, workflow_runs
+from tests.patience import wait_for
 from tests.programs import CHECKOUT, checkout_environment, python
 from workflow.commands.digest import digest
 
@@ -118,6 +120,28 @@ def test_modes_are_proved_on_three_nodes_as_on_one_machine(cluster, tmp_path, mp
     assert proved["ranks"] == RANKS and proved["threads"] == 1
     assert proved["inertia_count"] == proved["inertia_expected"] >= 30
     assert digest(tmp_path / "nodes.h5") == digest(tmp_path / "here.h5")
+
+
+def test_delayed_links_take_their_time(cluster, tmp_path):
+    (tmp_path / "there.py").write_text(
+        "import time; from mpi4py import MPI; ranks = MPI.COMM_WORLD;"
+        "ranks.barrier(); begin = time.perf_counter();"
+        "ranks.recv(source=0) if ranks.rank else [ranks.send(0, each) for each in (1, 2)];"
+        "ranks.barrier(); ranks.rank or print(time.perf_counter() - begin)"
+    )
+    links = [sys.executable, CHECKOUT / "slurm" / "delayed_links.py", cluster.folder, "50"]
+    process = subprocess.Popen([str(word) for word in links])
+    try:
+        there = ("ip", "link", "show", "late", "up")
+        wait_for(lambda: "late" in cluster.on("n3", *there).stdout, "no link", process)
+        program = f"srun --mpi=pmix {sys.executable} -m mpi4py there.py"
+        command = f"OMPI_MCA_btl_tcp_if_include=late {program}"
+        slurm_cluster.batch(tmp_path, f"--wrap={command}", options=ONE_RANK_EACH)
+    finally:
+        process.kill()
+        process.wait()
+    # A message, and the barrier's answer.
+    assert float(slurm_cluster.logs(tmp_path).split()[-1]) > 0.1
 
 
 def test_shards_of_an_array_are_those_of_one_process(cluster, here, tmp_path):

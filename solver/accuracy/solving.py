@@ -113,8 +113,8 @@ class _Search:
 
     def solved(self, solid: ProblemOptions, surface: SolidSurface | None = None) -> Solved:
         """Modes at one resolution; the surface on rank 0 if it was read before."""
-        with self.clock(SOLID):
-            problem = compute_on_root(self.comm, lambda: build_problem(solid, surface))
+        phase = self.clock(SOLID)
+        problem = compute_on_root(self.comm, lambda: build_problem(solid, surface), phase)
         estimated, tolerance = self.request.estimated, self.request.refine_to
         cells = solid.discretisation == "finite-cell"
         if tolerance is None and cells and estimated:

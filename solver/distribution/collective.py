@@ -5,6 +5,7 @@ Arrays travel as contiguous buffers, announced by one short message with their s
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -41,9 +42,17 @@ def bcast_from_root(comm: MPI.Comm, compute: Callable[[], T]) -> T:
     return cast(T, result)
 
 
-def compute_on_root(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
-    """Call `compute` on rank 0, which keeps the result; its exception is raised on every rank."""
-    result, failure = _attempt_on_root(comm, compute)
+def compute_on_root(
+    comm: MPI.Comm,
+    compute: Callable[[], T],
+    phase: AbstractContextManager[None] | None = None,
+) -> T | None:
+    """Call `compute` on rank 0, which keeps the result; its exception is raised on every rank.
+
+    It is timed as a `phase`, if that is given, at whose end the other ranks wait.
+    """
+    with phase or nullcontext():
+        result, failure = _attempt_on_root(comm, compute)
     failure = comm.bcast(failure, root=0)
     if failure is not None:
         raise failure
