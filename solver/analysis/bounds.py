@@ -18,6 +18,9 @@ a block Lanczos iteration corrects them together."""
 FEW_PARTS = 16
 """Largest number of subdomains for which these multiples hold. Beyond it the best ones grow about
 like the cube root of the number."""
+LEAST_LOCAL = 60
+"""Modes that a subdomain of average size keeps at least where nothing corrects them. With fewer
+beside its rigid motions, frequencies are off by tens of per cent."""
 FEWEST_BLOCKS, FEWEST_SQUARES = 2, 2
 """Least number of blocks of all vectors, and of matrices of their products, that any method keeps
 at a time."""
@@ -49,6 +52,11 @@ def require_memory(model: Solid | None, options: SolverOptions, comm: MPI.Comm) 
             )
 
     bcast_from_root(comm, check)
+
+
+def uncorrected_keep(modes: int, parts: int) -> int:
+    """Modes kept at the root where they stay as they are, see `modes_to_keep` of the groups."""
+    return max(default_keep(modes, parts), int(LEAST_LOCAL * parts**0.5))
 
 
 def default_keep(modes: int, parts: int, together: bool = False) -> int:

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import RIGID_MODES
-from solver.analysis.bounds import default_keep
+from solver.analysis.bounds import default_keep, uncorrected_keep
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import System
 from solver.distribution.local_mesh import LocalMesh
@@ -64,7 +64,11 @@ def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool
     keep = options.retained_modes
     if keep is None:
         parts = local_mesh.decomposition.tree.parts
-        keep = default_keep(options.modes, parts, together and options.is_corrected)
+        keep = (
+            default_keep(options.modes, parts, together and options.is_corrected)
+            if options.corrections
+            else uncorrected_keep(options.modes, parts)
+        )
     least = options.modes + (SPARE_MODES if options.corrections else 0)
     if keep < min(least, local_mesh.n_dofs):
         raise UserError(
