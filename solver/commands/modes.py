@@ -7,7 +7,7 @@ mpiexec -n RANKS python -m mpi4py -m carillon modes ...
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from mpi4py import MPI
@@ -48,7 +48,7 @@ from solver.files.initial_modes import modes_from_file
 from solver.files.modes_file import write_modes
 from solver.linear import petsc_options
 from solver.refinement.errors import RefinementOptions, RefinementStep
-from solver.refinement.model_solver import SolveByOptions
+from solver.refinement.model_solver import Beginning, SolveByOptions
 
 EXAMPLES = """examples:
   modes builtin:bell --resolution 32 --out bell.h5
@@ -157,45 +157,47 @@ class _FileStart:
     def __init__(self, path: str) -> None:
         self._path: str | None = path
 
-    def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial | None:
+    def suits(self, _solver: ModalSolver) -> bool:
+        return self._path is not None
+
+    def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial:
         path, self._path = self._path, None
-        if path is None:
-            return None
+        assert path is not None
         return modes_from_file(path, model, solver.options.modes, solver.local_mesh, solver.comm)
 
 
-def _beginning(
-    arguments: argparse.Namespace, solid: ProblemOptions, comm: MPI.Comm
-) -> Callable[[ModalSolver, Solid | None], Initial | None] | None:
-    if arguments.initial_modes is not None:
-        return _FileStart(arguments.initial_modes)
-    coarse = _CoarseStart(solid, comm)
-    if arguments.refine:
-        return coarse
-    voxels = solid.coarsen == "none" and solid.discretisation == "voxel"
-    return coarse.if_faster if voxels and arguments.method == AUTO else None
-
-
 class _CoarseStart:
-    """Modes of the coarsened solid, to start from."""
+    """Modes of the coarsened solid, to start from.
 
-    def __init__(self, solid: ProblemOptions, comm: MPI.Comm) -> None:
-        self._solid, self._comm = solid, comm
+    Where they are not `asked` for, conjugate gradients in a large solid start from them.
+    """
+
+    def __init__(self, solid: ProblemOptions, comm: MPI.Comm, asked: bool) -> None:
+        self._solid, self._comm, self._asked = solid, comm, asked
+
+    def suits(self, solver: ModalSolver) -> bool:
+        large = solver.local_mesh.n_dofs >= FEWEST_UNKNOWNS
+        return self._asked or (large and solver.options.method == "lobpcg")
 
     def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial:
-        coarsening = compute_on_root(self._comm, self._coarsening)
-        return coarse_start(solver, model, coarsening)
-
-    def if_faster(self, solver: ModalSolver, model: Solid | None) -> Initial | None:
-        """The same for conjugate gradients in a large solid, or else nothing."""
-        large = solver.local_mesh.n_dofs >= FEWEST_UNKNOWNS
-        return self(solver, model) if large and solver.options.method == "lobpcg" else None
+        return coarse_start(solver, model, compute_on_root(self._comm, self._coarsening))
 
     def _coarsening(self) -> Coarsening:
         forest, _ = forest_or_reason(self._solid.forest, self._solid.poisson)
         coarsening = forest or make_coarsening("galerkin")
         assert coarsening is not None
         return coarsening
+
+
+def _beginning(
+    arguments: argparse.Namespace, solid: ProblemOptions, comm: MPI.Comm
+) -> Beginning | None:
+    if arguments.initial_modes is not None:
+        return _FileStart(arguments.initial_modes)
+    voxels = solid.coarsen == "none" and solid.discretisation == "voxel"
+    if arguments.refine or (voxels and arguments.method == AUTO):
+        return _CoarseStart(solid, comm, arguments.refine)
+    return None
 
 
 def _write(solved: Solved, attributes: dict[str, Any], arguments: argparse.Namespace) -> None:

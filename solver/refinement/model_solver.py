@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol
 
 from mpi4py import MPI
 
@@ -21,6 +22,16 @@ SolveModel = Callable[..., Modes]
 """Finds the modes of one model after another, as `SolveByOptions` does."""
 
 
+class Beginning(Protocol):
+    """What an analysis starts from, where it is given something."""
+
+    def suits(self, solver: ModalSolver) -> bool:
+        """Whether the analysis is given something."""
+
+    def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial:
+        """What it starts from; collective."""
+
+
 class SolveByOptions:
     """Finds modes as options say.
 
@@ -33,7 +44,7 @@ class SolveByOptions:
         options: SolverOptions,
         comm: MPI.Comm = MPI.COMM_WORLD,
         verbose: bool = False,
-        begin: Callable[[ModalSolver, Solid | None], Initial | None] | None = None,
+        begin: Beginning | None = None,
         clock: RankClock | None = None,
     ) -> None:
         self.options = options
@@ -73,7 +84,7 @@ class SolveByOptions:
         if start is not None:
             with self._clock(INITIAL):
                 begin = start.begin(solver)
-        elif given is not None:
+        elif given is not None and given.suits(solver):
             with self._clock(INITIAL):
                 begin = given(solver, model)
         result = solver.solve(initial_modes=begin)
