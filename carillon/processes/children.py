@@ -38,12 +38,13 @@ _PR_SET_PDEATHSIG = 1
 
 
 def run_child(
-    command: Sequence[str], environment: Mapping[str, str]
+    command: Sequence[str], environment: Mapping[str, str], seconds: float | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run a program to its end and collect what it prints.
 
     It is sent SIGTERM when this process dies, also by SIGKILL, or leaves by an exception: launchers
-    of MPI end their ranks then.
+    of MPI end their ranks then.  Raises subprocess.TimeoutExpired if it takes longer than
+    `seconds`; it has ended then.
     """
     with subprocess.Popen(
         command,
@@ -56,7 +57,7 @@ def run_child(
         preexec_fn=_tied_to(os.getpid()),
     ) as child:
         try:
-            out, said = child.communicate()
+            out, said = child.communicate(timeout=seconds)
         except BaseException:
             _end(child)
             raise

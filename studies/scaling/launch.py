@@ -5,6 +5,7 @@ import logging
 import os
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -24,7 +25,7 @@ MOST_RANKS = 1024
 """Ranks that a study of scaling starts."""
 RANKS_OF_CORE = 16
 """Most ranks for each core of the machines they run on."""
-_ALLOWED = {
+ANY_RANKS = {
     # Open MPI binds ranks to cores, refuses root and more ranks than cores, unless told otherwise.
     "OMPI_MCA_hwloc_base_binding_policy": "none",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -60,7 +61,8 @@ def measure_each(
             out = Path(folder) / f"{ranks}.json"
             command = [launcher, "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "solver"]
             command += ["scaling", *given, "--here", "--out", str(out)]
-            failure = _run(command, {**_ALLOWED, **os.environ, "OMP_NUM_THREADS": "1"})
+            environment = {**ANY_RANKS, **os.environ, "OMP_NUM_THREADS": "1"}
+            failure = failure_of(run_child(command, environment))
             if failure is None:
                 results.append(json.loads(out.read_text()))
                 logger.info(f"{ranks} ranks: {results[-1]['seconds']:.2f} s")
@@ -88,11 +90,10 @@ def require_ranks(ranks: int, environment: Mapping[str, str] = os.environ) -> No
         )
 
 
-def _run(command: list[str], environment: dict[str, str]) -> str | None:
-    """Run to the end; what it said if it failed."""
-    done = run_child(command, environment)
+def failure_of(done: subprocess.CompletedProcess[str]) -> str | None:
+    """What a run that has ended said if it failed, in one sentence."""
     if done.returncode == 0:
         return None
     lines = [line for line in done.stderr.splitlines() if re.search(r"\w", line)]
-    said = [line for line in lines if line.startswith("solver")]
+    said = [line for line in lines if line.startswith(("solver", "carillon"))]
     return said[0] if said else shorten(f"exit status {done.returncode} {' '.join(lines)}", 300)

@@ -1,0 +1,172 @@
+"""Solve a case by every method, each run in processes of its own; a run that fails is a result."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from carillon.command_line.progress import say
+from carillon.errors import UserError
+from carillon.fem.model import RIGID_MODES
+from carillon.processes.children import run_child
+from studies.crossover.cases import METHODS, PLAIN, REFERENCE, Launch, choice_of_auto
+from studies.crossover.rank import FILES
+from studies.scaling.launch import ANY_RANKS, failure_of
+from workflow.arguments import options
+
+Row = dict[str, Any]
+NO_SOLUTION = ("mesh", "material", "inertia", "verification")
+"""Phases of a run that are no part of its solution: they make the moduli, or check the modes."""
+WARM_UP = ["builtin:bar", "--resolution", "12", "--modes", "20", "--no-estimate"]
+"""What every method solves first, untimed, so that its kernels are compiled."""
+LATE = "it was ended after {:g} s"
+
+
+@dataclass(frozen=True)
+class Runner:
+    """What runs `carillon modes` on the ranks of a launch."""
+
+    launch: Launch
+    cores: int
+    """Cores of a node."""
+    seconds: float
+    """Wall time after which a run is ended [s]."""
+    folder: Path
+    """Where runs keep their files meanwhile; all nodes see it."""
+
+    def run(self, words: Sequence[str]) -> Row:
+        """One run of `carillon modes WORDS`.
+
+        Returns plain values: `seconds` of the solution and `whole_seconds` of the processes [s];
+        `processor_seconds` of all ranks; `peak_memory_bytes` of the largest; `unknowns` and
+        `frequencies` [Hz]. Of a run that failed, only the `problem` in one sentence.
+        """
+        threads = self.launch.threads_of(self.cores)
+        if threads == 0:
+            return {"problem": f"it was not run: too few cores, {self.cores} on each node"}
+        environment = {**ANY_RANKS, **os.environ, "OMP_NUM_THREADS": str(threads)}
+        with TemporaryDirectory(dir=self.folder) as place:
+            several = ["-m", "mpi4py"] if self.launch.ranks > 1 else []
+            rank = [sys.executable, *several, "-m", "studies.crossover.rank", place]
+            out = ["--out", f"{place}/modes.h5", "--json"]
+            begun = time.perf_counter()
+            try:
+                command = [*self.launch.words(), *rank, "modes", *words, *out]
+                done = run_child(command, environment, self.seconds)
+            except UserError as error:
+                return {"problem": str(error)}
+            except subprocess.TimeoutExpired:
+                return {"problem": LATE.format(self.seconds)}
+            whole = time.perf_counter() - begun
+            problem = failure_of(done)
+            if problem is not None:
+                return {"problem": problem}
+            used = [json.loads(each.read_text()) for each in Path(place).glob(FILES)]
+        summary = json.loads(done.stdout[done.stdout.index("{") :])
+        phases = summary["timings"].items()
+        return {
+            "unknowns": summary["n_dofs"],
+            "threads": threads,
+            "seconds": sum(spent for phase, spent in phases if phase not in NO_SOLUTION),
+            "whole_seconds": whole,
+            "processor_seconds": sum(each["processor_seconds"] for each in used) or None,
+            "peak_memory_bytes": max((each["peak_memory_bytes"] for each in used), default=None),
+            "frequencies": summary["frequencies_hz"],
+        }
+
+
+def measure_case(runner: Runner, solid: Sequence[str], part: Mapping[str, Any]) -> list[Row]:
+    """All runs of a solid on the ranks of a launch.
+
+    Parameters
+    ----------
+    solid
+        Words of `carillon modes` that describe the solid.
+    part
+        The study's part of the configuration.
+
+    Returns
+    -------
+    list[Row]
+        A run a row, see `Runner.run`, with `modes`, `tolerance`, `method`, whether `auto` chooses
+        it, the largest relative `error` of its eigenvalues against those of the `reference`, and
+        whether that `reached` the tolerance.
+    """
+    # Methods with a limit come last, when the others have told how many unknowns there are.
+    methods = sorted(part["methods"], key=part["most_unknowns"].__contains__)
+    single = Runner(Launch(1), runner.cores, runner.seconds, runner.folder)
+    for name in methods:
+        single.run([*WARM_UP, *options(METHODS[name].options)])
+    rows: list[Row] = []
+    for modes in part["modes"]:
+        found: list[Row] = []
+        for name in methods:
+            found += _runs_of(runner, solid, modes, name, part, [*rows, *found])
+        rows += _judged(found)
+    return rows
+
+
+def _runs_of(
+    runner: Runner,
+    solid: Sequence[str],
+    modes: int,
+    name: str,
+    part: Mapping[str, Any],
+    before: Sequence[Row],
+) -> list[Row]:
+    """Runs of one method to every tolerance, the largest first."""
+    known = next((row["unknowns"] for row in before if "unknowns" in row), 0)
+    most = part["most_unknowns"].get(name, known)
+    last: Row = {}
+    rows = []
+    for tolerance in sorted(part["tolerances"], reverse=True):
+        how = {"modes": modes, "tolerance": tolerance, **METHODS[name].options}
+        if known > most:
+            last = {"problem": f"it was not run: a limit of {most:,} unknowns is set for it"}
+        elif last.get("problem") == LATE.format(runner.seconds):
+            pass
+        elif name != PLAIN or not last:  # whose result does not depend on the tolerance
+            last = runner.run([*solid, *options(how)])
+        rows.append({"modes": modes, "tolerance": tolerance, "method": name, **last})
+        spent = last.get("problem") or f"{last['seconds']:.2f} s"
+        say(f"{METHODS[name].label}, {modes} modes to {tolerance:g}: {spent}")
+    return rows
+
+
+def _judged(rows: list[Row]) -> list[Row]:
+    """The rows of one number of modes with what is said of their errors, see `measure_case`.
+
+    The reference is SLEPc's run to the smallest tolerance, or else that of any other method.
+    """
+    solved = [row for row in rows if "problem" not in row]
+    if not solved:
+        return rows
+    kinds = (PLAIN, REFERENCE)
+    best = min(
+        solved,
+        key=lambda row: (row["method"] == kinds[0], row["method"] != kinds[1], row["tolerance"]),
+    )
+    exact = np.square(best["frequencies"])[RIGID_MODES:]
+    # SLEPc is given a residual, whose square is about the error of the eigenvalue.
+    doubt = 0.0 if best["method"] == REFERENCE else best["tolerance"]
+    judged = []
+    for row in rows:
+        row = {**row, "unknowns": best["unknowns"]}
+        row["auto"] = row["method"] == choice_of_auto(
+            row["modes"], row["tolerance"], row["unknowns"]
+        )
+        frequencies = row.pop("frequencies", None)
+        if frequencies is not None:
+            error = float(np.abs(np.square(frequencies)[RIGID_MODES:] / exact - 1.0).max())
+            row |= {"error": error, "reached": error <= row["tolerance"] + doubt}
+            row["reference"] = METHODS[best["method"]].label
+        judged.append(row)
+    return judged
