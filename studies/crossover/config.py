@@ -15,6 +15,7 @@ from workflow.configuration.section import (
     Distinct,
     File,
     Ranks,
+    Runs,
     Seconds,
     Several,
     Title,
@@ -71,6 +72,9 @@ class CrossoverSection:
         (LaunchEntry(ranks=1), LaunchEntry(ranks=2)), "ranks, nodes and networks, each measured"
     )
     seconds: Seconds = option(60.0, "wall time after which a run is ended [s]")
+    runs: Runs = option(
+        1, "runs of which the fastest counts; what takes a tenth of the limit runs once [1]"
+    )
     most_unknowns: dict[str, Annotated[int, Ge(1), Le(2**31)]] = option(
         dict, "largest number of unknowns that a method is run on, by its name [1]"
     )

@@ -19,6 +19,10 @@ FIGURES = {
 }
 
 
+DISTURBING = 0.2
+"""Cores in use by other programs from which on a run counts as disturbed."""
+
+
 def page(study: Crossover, tables: dict[str, Table]) -> StudyPage:
     """Build the page from the tables and figures of a study; nothing is computed anew."""
     cells, runs = tables["fastest"], tables["runs"]
@@ -35,7 +39,7 @@ def page(study: Crossover, tables: dict[str, Table]) -> StudyPage:
             section(
                 "Verdict",
                 note(study.without),
-                prose(" ".join(verdict(study.runs))),
+                prose(" ".join(verdict(study.runs)), disturbed(runs.rows)),
                 grid(tables["methods"]),
             ),
             section("Fastest", *grids),
@@ -49,6 +53,18 @@ def page(study: Crossover, tables: dict[str, Table]) -> StudyPage:
             ),
             origins(tables["provenance"]),
         ],
+    )
+
+
+def disturbed(rows: list[Row]) -> str:
+    """One sentence about other programs that ran beside the runs; empty if there were none."""
+    ended = [row["others"] for row in rows if row.get("others") is not None]
+    count = sum(each > DISTURBING for each in ended)
+    if not count:
+        return ""
+    return (
+        f"Beside {count} of {len(ended)} runs other programs had more than "
+        f"{DISTURBING:g} cores, up to {max(ended):.1f}: their wall times are too long."
     )
 
 

@@ -14,7 +14,7 @@ from studies.crossover.cases import METHODS, SECTION, Case, cases_of
 YES, NO = "yes", "no"
 NUMBERS = (
     *("resolution", "unknowns", "modes", "nodes", "ranks", "threads", "latency", "tolerance"),
-    *("seconds", "whole_seconds", "processor_seconds", "peak_memory_bytes", "error"),
+    *("seconds", "whole_seconds", "processor_seconds", "peak_memory_bytes", "others", "error"),
 )
 TEXTS = ("machine", "model", "title", "method", "label", "auto", "reference", "reached", "problem")
 """Columns of the runs."""

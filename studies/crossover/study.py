@@ -15,7 +15,7 @@ def measured_files(config: Config) -> list[str]:
 
 def measured_part(config: Config) -> dict[str, Any]:
     """What of the configuration a measurement depends on, beside solid and launch."""
-    names = ("modes", "tolerances", "methods", "seconds", "most_unknowns")
+    names = ("modes", "tolerances", "methods", "seconds", "runs", "most_unknowns")
     return {name: config[SECTION][name] for name in names}
 
 

@@ -108,7 +108,7 @@ def _plain(runs: pd.DataFrame, best: pd.DataFrame) -> str:
     own = best.dropna(subset=["error"])
     if own.empty:
         return "HCMS without correction was not run."
-    errors = f"{show(own['error'].min(), 'small')} to {show(own['error'].max(), 'small')}"
+    errors = _range(own["error"], "small")
     ran = runs[(runs["method"] == PLAIN) & (runs["reached"] == YES)]
     reached, won = own.merge(ran[CELL], on=CELL), own[own["method"] == PLAIN]
     begin = f"HCMS without correction has eigenvalue errors of {errors} at the worst mode"
@@ -133,8 +133,8 @@ def _corrected(best: pd.DataFrame) -> str:
         return f"{sentence}."
     times, worst = lost["times_hcms_ec"], lost.loc[lost["times_hcms_ec"].idxmax()]
     return (
-        f"{sentence}; elsewhere it takes {show(times.min(), 'times')} to "
-        f"{show(times.max(), 'times')} the time of the fastest, the most at {_span_of(worst)}."
+        f"{sentence}; elsewhere it takes {_range(times, 'times')} the time of the fastest, the "
+        f"most at {_span_of(worst)}."
     )
 
 
@@ -165,14 +165,14 @@ def _span_of(row: pd.Series) -> str:
 def _span(cells: pd.DataFrame) -> str:
     """Where cells are, in a few words: from the least to the greatest of everything."""
 
-    def values(key: str, kind: str, word: str = "", plural: str = "s") -> str:
-        several = sorted(set(cells[key]))
-        ends = dict.fromkeys(show(each, kind) for each in (several[0], several[-1]))
-        last = plural if several[-1] != 1 else ""
-        return f"{' to '.join(ends)}{f' {word}{last}' if word else ''}"
+    keys = ["unknowns", "modes", "ranks", *(["nodes"] if (cells["nodes"] > 1).any() else [])]
+    counts = [
+        f"{_range(cells[key], 'count')} {key[:-1] if cells[key].max() == 1 else key}"
+        for key in keys
+    ]
+    return f"{', '.join(counts)}, tolerance {_range(cells['tolerance'], 'small')}"
 
-    parts = [values("unknowns", "count", "unknown"), values("modes", "count", "mode")]
-    parts.append(values("ranks", "count", "rank"))
-    if (cells["nodes"] > 1).any():
-        parts.append(values("nodes", "count", "node"))
-    return f"{', '.join(parts)}, tolerance {values('tolerance', 'small')}"
+
+def _range(values: pd.Series, kind: str) -> str:
+    """The least and the greatest value as of a kind of number, once if they read the same."""
+    return " to ".join(dict.fromkeys(show(each, kind) for each in (values.min(), values.max())))
