@@ -1,6 +1,6 @@
 """Figures of the study: time and memory over unknowns, a line a method."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -13,7 +13,7 @@ from studies.base.numbers import show
 from studies.base.style import logarithmic, plain
 from studies.crossover.cases import METHODS
 from studies.crossover.results import NO, YES, Crossover, frame_of
-from studies.crossover.winners import PANEL
+from studies.crossover.winners import PANEL, in_words
 
 LOOKS = {
     "hcms": ("o", COLOURS["hcms"]),
@@ -47,7 +47,7 @@ def memory_figure(study: Crossover) -> Figure:
 
 def panel_title(about: Mapping[str, Any], several: bool = False) -> str:
     """Tolerance, ranks, nodes and latency in words; the machine, too, if there are several."""
-    parts = [] if "tolerance" not in about else [f"to {show(about['tolerance'], 'small')}"]
+    parts = [] if "tolerance" not in about else [f"to {in_words(about['tolerance'])}"]
     nodes, ranks = int(about["nodes"]), int(about["ranks"])
     parts.append(f"{ranks} rank{'s' * (ranks > 1)}")
     parts += [f"{nodes} nodes"] if nodes > 1 else []
@@ -71,40 +71,41 @@ def _figure(
         sharey=True,
         squeeze=False,
     )
+    ends = {}
     for line, (names, group) in zip(axes, groups, strict=True):
         title = panel_title(dict(zip(panel, names)), several)
         for axis, count in zip(line, modes, strict=True):
             own = group[group["modes"] == count]
             logarithmic(axis.xaxis, axis.yaxis)
             axis.set_title(plain(f"{int(count)} modes, {title}"))
-            _labelled(axis, _lines(axis, own, lambda part: part[key] * unit))
+            ends[axis] = _lines(axis, own.assign(value=own[key] * unit))
         line[0].set_ylabel(label)
     for axis in axes[-1]:
         axis.set_xlabel("unknowns")
+    # All panels have the same limits once every line is drawn.
+    for axis, own in ends.items():
+        _labelled(axis, own)
     return figure
 
 
-def _lines(
-    axis: Any, rows: pd.DataFrame, values: Callable[[pd.DataFrame], Any]
-) -> dict[str, tuple[float, float]]:
-    """Draw a line a method; returns where each ends."""
+def _lines(axis: Any, rows: pd.DataFrame) -> dict[str, float]:
+    """Draw a line a method; returns the value at which each ends."""
     ends = {}
     for method, part in rows.groupby("method"):
         marker, colour = LOOKS[str(method)]
-        part = part.assign(value=values(part)).sort_values("unknowns")
         axis.plot(part["unknowns"], part["value"], "-", color=colour, linewidth=1.3)
         for reached, face in ((YES, colour), (NO, "white")):
             own = part[part["reached"] == reached]
             style = {"markersize": 4.5, "color": colour, "markerfacecolor": face}
             axis.plot(own["unknowns"], own["value"], marker, **style)
-        ends[str(method)] = (part["unknowns"].iloc[-1], part["value"].iloc[-1])
+        ends[str(method)] = part["value"].iloc[-1]
     return ends
 
 
-def _labelled(axis: Any, ends: Mapping[str, tuple[float, float]]) -> None:
+def _labelled(axis: Any, ends: Mapping[str, float]) -> None:
     """Write the names of the methods right of the axes, as high as their lines end, but apart."""
     low, high = np.log(axis.get_ylim())
-    heights = {name: (np.log(end[1]) - low) / (high - low) for name, end in ends.items()}
+    heights = {name: (np.log(end) - low) / (high - low) for name, end in ends.items()}
     order = sorted(heights, key=heights.__getitem__)
     at = -np.inf
     places = {}

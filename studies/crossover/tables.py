@@ -1,4 +1,4 @@
-"""Tables of the study: the fastest method of every cell, all methods, and all runs."""
+"""Tables of the study: the fastest method of every case, all methods, and all runs."""
 
 from collections.abc import Iterator
 
@@ -35,14 +35,14 @@ PANEL = (
     Column("label", "Fastest"),
     Column("seconds", "Time", "seconds"),
     Column("second", "Second"),
-    Column("times_second", "its time", "times"),
-    Column("times_slepc", "SLEPc’s", "times"),
-    Column("times_hcms_ec", "HCMS + EC’s", "times"),
-    Column("times_hcms", "HCMS’s", "times"),
+    Column("times_second", "takes", "times"),
+    Column("times_slepc", "SLEPc takes", "times"),
+    Column("times_hcms_ec", "HCMS + EC", "times"),
+    Column("times_hcms", "HCMS", "times"),
     Column("error", "its error", "small"),
-    Column("auto", "auto"),
+    Column("auto", "auto chooses"),
     hidden(f"auto{MARK}", "mark of auto"),
-    hidden("times_auto", "auto’s", "times"),
+    hidden("times_auto", "auto takes", "times"),
     keys="machine nodes ranks latency tolerance title unknowns modes",
     conditions=MEASURED,
 )
@@ -72,7 +72,7 @@ def fastest(study: Crossover) -> Iterator[Row]:
     Column("times_worst", "largest", "times"),
 )
 def methods(study: Crossover) -> Iterator[Row]:
-    """Every method over all cells in which one reached the tolerance: runs, those that came to an
+    """Every method over all cases in which one reached the tolerance: runs, those that came to an
     end, those within the tolerance, those that were the fastest; and, where it was within the
     tolerance, its time over that of the fastest."""
     return by_method(study.runs)

@@ -1,7 +1,7 @@
 """From runs to the fastest method of every cell, and to what that says, in sentences.
 
-A cell is a solid with a number of modes, on some ranks of a machine, to a tolerance. Only methods
-whose eigenvalues are within the tolerance compete in it.
+A cell, which the page calls a case, is a solid with a number of modes, on some ranks of a machine,
+to a tolerance. Only methods whose eigenvalues are within the tolerance compete in it.
 """
 
 from collections.abc import Iterator
@@ -97,7 +97,7 @@ def verdict(runs: pd.DataFrame) -> list[str]:
     counts = best["label"].value_counts()
     shares = ", ".join(f"{label} in {count}" for label, count in counts.items())
     return [
-        f"The fastest of {_cells(len(best))} is {shares}.",
+        f"Of {_cells(len(best))}, the fastest method is {shares}.",
         _plain(runs, best),
         _corrected(best),
         _auto(best),
@@ -127,24 +127,24 @@ def _corrected(best: pd.DataFrame) -> str:
     if own.empty:
         return "HCMS + EC was not run."
     won, lost = own[own["method"] == CORRECTED], own[own["method"] != CORRECTED]
-    sentence = f"HCMS + EC wins {len(won)} of {_cells(len(own))}"
+    sentence = f"HCMS + EC wins {len(won) or 'none'} of {_cells(len(own))}"
     sentence += f": {_span(won)}" if len(won) else ""
     if lost.empty:
         return f"{sentence}."
     times, worst = lost["times_hcms_ec"], lost.loc[lost["times_hcms_ec"].idxmax()]
     return (
-        f"{sentence}; elsewhere it takes {_range(times, 'times')} the time of the fastest, the "
-        f"most at {_span_of(worst)}."
+        f"{sentence}; {'elsewhere ' if len(won) else ''}it takes {_range(times, 'times')} the "
+        f"time of the fastest, the most at {_span_of(worst)}."
     )
 
 
 def _auto(best: pd.DataFrame) -> str:
     own = best.dropna(subset=["times_auto"])
     if own.empty:
-        return "What auto chooses was not run."
+        return "What --method auto chooses was not run, or missed its tolerance."
     good = int((own["times_auto"] <= AS_FAST).sum())
-    sentence = f"auto chooses the fastest, or what takes 10 % more at most, in {good} of "
-    sentence += _cells(len(own))
+    sentence = "--method auto chooses the fastest, or one that takes 10 % more at most, in "
+    sentence += f"{good} of {_cells(len(own))}"
     if good == len(own):
         return f"{sentence}."
     worst = own.loc[own["times_auto"].idxmax()]
@@ -170,7 +170,19 @@ def _span(cells: pd.DataFrame) -> str:
         f"{_range(cells[key], 'count')} {key[:-1] if cells[key].max() == 1 else key}"
         for key in keys
     ]
-    return f"{', '.join(counts)}, tolerance {_range(cells['tolerance'], 'small')}"
+    ends = (cells["tolerance"].min(), cells["tolerance"].max())
+    return f"{', '.join(counts)}, tolerance {' to '.join(dict.fromkeys(map(in_words, ends)))}"
+
+
+def in_words(tolerance: float) -> str:
+    """A tolerance as it is spelt in a configuration, or as a power of ten.
+
+    Examples
+    --------
+    >>> in_words(0.01), in_words(1e-6)
+    ('0.01', '10⁻⁶')
+    """
+    return f"{tolerance:g}" if tolerance >= 1e-3 else show(tolerance, "small")
 
 
 def _range(values: pd.Series, kind: str) -> str:
