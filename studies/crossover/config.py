@@ -1,13 +1,14 @@
 """Keys of the study in the configuration, and what its jobs take."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Literal
+from typing import Annotated
 
 from annotated_types import Ge, Le
 
-from carillon.parameters import REQUIRED, option, parameters
+from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.quantities import Tolerance
 from carillon.parameters.sentences import ParameterError
+from studies.crossover.methods import METHODS
 from workflow.configuration.resources import JobLimits
 from workflow.configuration.run import Configuration
 from workflow.configuration.section import (
@@ -28,15 +29,12 @@ from workflow.configuration.solids import (
     default_solids,
 )
 
-MethodName = Literal["hcms", "hcms_ec", "lanczos", "lobpcg", "hcms_lobpcg", "slepc", "arpack"]
-METHODS: tuple[MethodName, ...] = (
-    *("hcms", "hcms_ec", "lanczos", "lobpcg", "hcms_lobpcg"),
-    *("slepc", "arpack"),
-)
+MethodName = Annotated[str, OneOf(*METHODS)]
+SECTION = "crossover"
 
 
 @parameters
-class LaunchEntry:
+class Launch:
     """How the ranks of a run are started, and on what network."""
 
     _: KW_ONLY
@@ -51,6 +49,17 @@ class LaunchEntry:
     launcher: CommandLine | None = option(
         None, "what starts the ranks, such as srun --mpi=pmix -N3 -n3; mpiexec -n RANKS if null"
     )
+
+    @property
+    def label(self) -> str:
+        """Ranks, nodes and latency as a part of a file's name."""
+        network = "" if self.latency is None else f"-{self.latency:g}s"
+        return f"{self.ranks}-on-{self.nodes}{network}"
+
+    def threads_of(self, cores: int) -> int:
+        """Threads of a rank, where each node has so many cores; 0 if the ranks are too many."""
+        share = cores * self.nodes // self.ranks
+        return share if self.threads is None else self.threads * (self.threads <= share)
 
 
 @parameters
@@ -67,9 +76,9 @@ class CrossoverSection:
     tolerances: Several[Tolerance] = option(
         (1e-2, 1e-6), "relative eigenvalue errors that methods are asked for, each [1]"
     )
-    methods: Several[MethodName] = option(METHODS, "names of the methods")
-    launches: Several[LaunchEntry] = option(
-        (LaunchEntry(ranks=1), LaunchEntry(ranks=2)), "ranks, nodes and networks, each measured"
+    methods: Several[MethodName] = option(tuple(METHODS), "names of the methods")
+    launches: Several[Launch] = option(
+        (Launch(ranks=1), Launch(ranks=2)), "ranks, nodes and networks, each measured"
     )
     seconds: Seconds = option(60.0, "wall time after which a run is ended [s]")
     runs: Runs = option(
@@ -91,14 +100,13 @@ class CrossoverSection:
                 raise ParameterError(
                     ("most_unknowns",), f"{name!r} is no method, expected one of {known}"
                 )
-        labels = [(launch.ranks, launch.nodes, launch.latency) for launch in self.launches]
-        if len(set(labels)) < len(labels):
+        if len({launch.label for launch in self.launches}) < len(self.launches):
             raise ParameterError(
                 ("launches",), "two have the same ranks, nodes and latency, expected others"
             )
 
 
-SECTIONS = {"crossover": CrossoverSection}
+SECTIONS = {SECTION: CrossoverSection}
 LIMITS = {
     "measure_crossover": JobLimits(
         "a solid of the crossover, by all methods on some ranks", 8000, 240

@@ -2,6 +2,8 @@
 
 import json
 import os
+import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -17,9 +19,11 @@ from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
 from carillon.processes.children import run_child
-from studies.crossover.cases import METHODS, PLAIN, REFERENCE, Launch, choice_of_auto
+from solver.analysis.options import SolverOptions
+from studies.crossover.config import Launch
+from studies.crossover.methods import METHODS, PLAIN, REFERENCE
 from studies.crossover.rank import FILES
-from studies.scaling.launch import ANY_RANKS, failure_of
+from studies.scaling.launch import ANY_RANKS, LAUNCHER, failure_of
 from workflow.arguments import options
 
 Row = dict[str, Any]
@@ -62,7 +66,7 @@ class Runner:
             out = ["--out", f"{place}/modes.h5", "--json"]
             begun, busy = time.perf_counter(), _busy_seconds()
             try:
-                command = [*self.launch.words(), *rank, "modes", *words, *out]
+                command = [*launcher_words(self.launch), *rank, "modes", *words, *out]
                 done = run_child(command, environment, self.seconds)
             except UserError as error:
                 return {"problem": str(error)}
@@ -86,6 +90,36 @@ class Runner:
             "peak_memory_bytes": max((each["peak_memory_bytes"] for each in used), default=None),
             "frequencies": summary["frequencies_hz"],
         }
+
+
+def launcher_words(launch: Launch) -> list[str]:
+    """The words that start the ranks; none for a single one.
+
+    Raises UserError if the program is not on PATH.
+    """
+    if launch.launcher is None and launch.ranks == 1:
+        return []
+    words = shlex.split(launch.launcher or f"{LAUNCHER} -n {launch.ranks}")
+    program = shutil.which(words[0])
+    if program is None:
+        raise UserError(f"no {words[0]} on PATH; install it, or name another launcher")
+    return [program, *words[1:]]
+
+
+def choice_of_auto(modes: int, tolerance: float, unknowns: int) -> str | None:
+    """Name of the method that `--method auto` is; None if it is none of them.
+
+    Examples
+    --------
+    >>> choice_of_auto(20, 1e-6, 30)
+    'hcms_ec'
+    """
+
+    def resolved(**chosen: Any) -> SolverOptions:
+        return SolverOptions(modes=modes, tolerance=tolerance, **chosen).with_method(unknowns)
+
+    auto = resolved()
+    return next((name for name, each in METHODS.items() if resolved(**each.options) == auto), None)
 
 
 def _busy_seconds() -> float:
@@ -114,7 +148,7 @@ def measure_case(runner: Runner, solid: Sequence[str], part: Mapping[str, Any]) 
     """
     # Methods with a limit come last, when the others have told how many unknowns there are.
     methods = sorted(part["methods"], key=part["most_unknowns"].__contains__)
-    single = Runner(Launch(1), runner.cores, runner.seconds, runner.folder)
+    single = Runner(Launch(ranks=1), runner.cores, runner.seconds, runner.folder)
     for name in methods:
         single.run([*WARM_UP, *options(METHODS[name].options)])
     rows: list[Row] = []
@@ -137,14 +171,15 @@ def _runs_of(
     """Runs of one method to every tolerance, the largest first."""
     known = next((row["unknowns"] for row in before if "unknowns" in row), 0)
     most = part["most_unknowns"].get(name, known)
+    late = LATE.format(runner.seconds)
     last: Row = {}
     rows = []
     for tolerance in sorted(part["tolerances"], reverse=True):
         how = {"modes": modes, "tolerance": tolerance, **METHODS[name].options}
         if known > most:
             last = {"problem": f"it was not run: a limit of {most:,} unknowns is set for it"}
-        elif last.get("problem") == LATE.format(runner.seconds):
-            pass
+        elif last.get("problem", "").endswith(late):
+            last = {"problem": f"it was not run: to a larger tolerance {late}"}
         elif name != PLAIN or not last:  # whose result does not depend on the tolerance
             last = _fastest_of(part["runs"], runner, [*solid, *options(how)])
         rows.append({"modes": modes, "tolerance": tolerance, "method": name, **last})
@@ -170,11 +205,8 @@ def _judged(rows: list[Row]) -> list[Row]:
     solved = [row for row in rows if "problem" not in row]
     if not solved:
         return rows
-    kinds = (PLAIN, REFERENCE)
-    best = min(
-        solved,
-        key=lambda row: (row["method"] == kinds[0], row["method"] != kinds[1], row["tolerance"]),
-    )
+    rank = {REFERENCE: 0, PLAIN: 2}
+    best = min(solved, key=lambda row: (rank.get(row["method"], 1), row["tolerance"]))
     exact = np.square(best["frequencies"])[RIGID_MODES:]
     # SLEPc is given a residual, whose square is about the error of the eigenvalue.
     doubt = 0.0 if best["method"] == REFERENCE else best["tolerance"]

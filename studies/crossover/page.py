@@ -81,9 +81,10 @@ def _panel(cells: Table, rows: list[Row], number: int) -> Markup:
 
 
 def _failure(row: Row) -> Markup:
+    size = html("{:count} unknowns, ", row["unknowns"]) if row.get("unknowns") else ""
     return html(
-        "{title}, {size} unknowns, {modes} modes, {where}, {label}: {problem}",
-        size=html("{:count}", row["unknowns"]) if row.get("unknowns") else "unknown many",
+        "{title}, {size}{modes} modes, {where}, {label}: {problem}",
+        size=size,
         where=panel_title(row),
         **{key: row[key] for key in ("title", "modes", "label", "problem")},
     )

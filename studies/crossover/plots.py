@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from studies.base.colours import COLOURS
 from studies.base.numbers import show
 from studies.base.style import logarithmic, plain
-from studies.crossover.cases import METHODS
+from studies.crossover.methods import METHODS
 from studies.crossover.results import NO, YES, Crossover, frame_of
 from studies.crossover.winners import PANEL, in_words
 
@@ -61,10 +61,10 @@ def _figure(
 ) -> Figure:
     frame = frame_of(rows).dropna(subset=[key]).sort_values("unknowns")
     groups = list(frame.groupby(panel, dropna=False))
-    modes = sorted(set(frame["modes"]))
+    modes = sorted(set(frame["modes"])) or [0]
     several = frame["machine"].nunique() > 1
     figure, axes = plt.subplots(
-        len(groups),
+        max(1, len(groups)),
         len(modes),
         figsize=(max(4.6, 3.9 * len(modes)), 0.3 + 2.7 * len(groups)),
         sharex=True,
@@ -72,7 +72,7 @@ def _figure(
         squeeze=False,
     )
     ends = {}
-    for line, (names, group) in zip(axes, groups, strict=True):
+    for line, (names, group) in zip(axes, groups):
         title = panel_title(dict(zip(panel, names)), several)
         for axis, count in zip(line, modes, strict=True):
             own = group[group["modes"] == count]

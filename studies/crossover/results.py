@@ -9,7 +9,9 @@ import pandas as pd
 from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.table import read_csv_table
-from studies.crossover.cases import METHODS, SECTION, Case, cases_of
+from studies.crossover.cases import Case, cases_of
+from studies.crossover.config import SECTION
+from studies.crossover.methods import METHODS
 
 YES, NO = "yes", "no"
 NUMBERS = (

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from studies.base.study import Config, Figure, Study
-from studies.crossover.cases import SECTION, cases_of
+from studies.crossover.cases import cases_of
+from studies.crossover.config import SECTION
 
 
 def measured_files(config: Config) -> list[str]:

@@ -6,7 +6,8 @@ import pytest
 import yaml
 
 from studies.base.table import read_table
-from studies.crossover.cases import METHODS, cases_of
+from studies.crossover.cases import cases_of
+from studies.crossover.methods import METHODS
 from studies.crossover.results import Crossover, frame_of
 from studies.crossover.study import CROSSOVER
 from studies.crossover.winners import by_method, fastest, verdict
@@ -112,6 +113,15 @@ def test_the_page_holds_tables_and_figures(study):
     assert "Beside 4 of 20 runs other programs had more than 0.2 cores, up to 0.5" in page.source
     assert 'class="met">Block Lanczos</td>' in page.source
     assert 'class="missed">Block Lanczos 4.0×</td>' in page.source
+
+
+def test_a_page_is_made_when_every_run_failed(tmp_path):
+    about = {"method": "slepc", "modes": 64, "tolerance": 1e-6}
+    failed = [{**about, "problem": "it was not run: too few cores"}]
+    study = study_of(tmp_path, failed, failed)
+    page = page_of(CROSSOVER, study, study.folder / "report.html")
+    assert "No method has reached its tolerance anywhere." in page.source
+    assert page.source.count("<li>Bar, 64 modes, to 10⁻⁶") == 2
 
 
 def test_runs_of_another_machine_are_joined_and_compete_among_themselves(study, tmp_path):

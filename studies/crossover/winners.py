@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from studies.base.numbers import show
-from studies.crossover.cases import CORRECTED, METHODS, PLAIN, REFERENCE
+from studies.crossover.methods import CORRECTED, METHODS, PLAIN, REFERENCE
 from studies.crossover.results import YES
 
 PANEL = ["machine", "nodes", "ranks", "latency", "tolerance"]
@@ -164,7 +164,6 @@ def _span_of(row: pd.Series) -> str:
 
 def _span(cells: pd.DataFrame) -> str:
     """Where cells are, in a few words: from the least to the greatest of everything."""
-
     keys = ["unknowns", "modes", "ranks", *(["nodes"] if (cells["nodes"] > 1).any() else [])]
     counts = [
         f"{_range(cells[key], 'count')} {key[:-1] if cells[key].max() == 1 else key}"
