@@ -11,7 +11,7 @@ from workflow.arguments import options
 
 
 @dataclass(frozen=True)
-class Case:
+class SolidOnRanks:
     """A solid at a resolution on some ranks: all that one job measures."""
 
     solid: str
@@ -24,23 +24,23 @@ class Case:
         return f"cases/{self.solid}/{self.resolution}-{self.launch.label}.json"
 
 
-def cases_of(config: Mapping[str, Any]) -> list[Case]:
+def cases_of(config: Mapping[str, Any]) -> list[SolidOnRanks]:
     """All cases whose mesh exists, in the order of the configuration."""
     part = config[SECTION]
     return [
-        Case(solid, resolution, parameters_from(launch, Launch))
+        SolidOnRanks(solid, resolution, parameters_from(launch, Launch))
         for solid in solids.named(config, f"{SECTION}.models")
         for resolution in part["models"][solid]["resolutions"]
         for launch in part["launches"]
     ]
 
 
-def case_at(config: Mapping[str, Any], path: str) -> Case:
+def case_at(config: Mapping[str, Any], path: str) -> SolidOnRanks:
     """The case whose result file ends with `path`."""
     return next(case for case in cases_of(config) if path.endswith(case.path))
 
 
-def solid_arguments(config: Mapping[str, Any], case: Case) -> list[str]:
+def solid_arguments(config: Mapping[str, Any], case: SolidOnRanks) -> list[str]:
     """Words of `carillon modes` that describe the solid of a case."""
     part = config[SECTION]
     how = {

@@ -9,7 +9,7 @@ REFERENCE, PLAIN, CORRECTED = "slepc", "hcms", "hcms_ec"
 
 
 @dataclass(frozen=True)
-class Method:
+class SolverMethod:
     """A method of `carillon modes`."""
 
     label: str
@@ -19,12 +19,12 @@ class Method:
 
 
 METHODS = {
-    PLAIN: Method("HCMS", {"method": "hcms", "corrections": 0}),
-    CORRECTED: Method("HCMS + EC", {"method": "hcms"}),
-    "lanczos": Method("Block Lanczos", {"method": "lanczos"}),
-    "lobpcg": Method("LOBPCG", {"method": "lobpcg"}),
-    "hcms_lobpcg": Method("HCMS + LOBPCG", {"method": "hcms", "linear_solver": "amg-cg"}),
-    REFERENCE: Method("SLEPc", {"method": "slepc"}),
-    "arpack": Method("ARPACK", {"method": "arpack"}),
+    PLAIN: SolverMethod("HCMS", {"method": "hcms", "corrections": 0}),
+    CORRECTED: SolverMethod("HCMS + EC", {"method": "hcms"}),
+    "lanczos": SolverMethod("Block Lanczos", {"method": "lanczos"}),
+    "lobpcg": SolverMethod("LOBPCG", {"method": "lobpcg"}),
+    "hcms_lobpcg": SolverMethod("HCMS + LOBPCG", {"method": "hcms", "linear_solver": "amg-cg"}),
+    REFERENCE: SolverMethod("SLEPc", {"method": "slepc"}),
+    "arpack": SolverMethod("ARPACK", {"method": "arpack"}),
 }
 """All methods by their names in the configuration."""

@@ -9,7 +9,7 @@ import pandas as pd
 from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.table import read_csv_table
-from studies.crossover.cases import Case, cases_of
+from studies.crossover.cases import SolidOnRanks, cases_of
 from studies.crossover.config import SECTION
 from studies.crossover.methods import METHODS
 
@@ -28,7 +28,7 @@ class Crossover(Results):
     section = SECTION
 
     @cached_property
-    def measured(self) -> dict[Case, dict[str, Any]]:
+    def measured(self) -> dict[SolidOnRanks, dict[str, Any]]:
         """Content of the result files by case."""
         return {case: self.read_json(case.path) for case in cases_of(self.config)}
 
