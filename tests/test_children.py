@@ -32,6 +32,14 @@ def test_output_and_status_are_handed_on():
     assert (done.returncode, done.stdout, done.stderr) == (1, "1\n", "no\n")
 
 
+def test_a_child_that_takes_too_long_is_ended(tmp_path):
+    program = "import os, sys, time; open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep(60)"
+    with pytest.raises(subprocess.TimeoutExpired):
+        run_child([sys.executable, "-c", program, str(tmp_path / "id")], os.environ, seconds=2.0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "id").read_text()), 0)
+
+
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_a_child_ends_when_its_parent_is_killed(how, tmp_path):
     pipe = tmp_path / "pipe"

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
@@ -250,14 +251,14 @@ def test_bad_arguments_are_answered_in_one_sentence(arguments, sentence, tmp_pat
 def test_a_run_that_fails_is_told_and_the_others_go_on(monkeypatch):
     def run_on_one(command, _):
         if command[command.index("-n") + 1] != "1":
-            return "no memory"
+            return CompletedProcess(command, 2, "", "bound to cores\nsolver scaling: no memory\n")
         Path(command[-1]).write_text('{"ranks": 1, "seconds": 1.0}')
-        return None
+        return CompletedProcess(command, 0, "", "")
 
-    monkeypatch.setattr(launch, "_run", run_on_one)
+    monkeypatch.setattr(launch, "run_child", run_on_one)
     found, failed = launch.measure_each({1: ["builtin:bar"], 2: ["builtin:bar"]})
-    assert [run["ranks"] for run in found] == [1] and failed == {2: "no memory"}
-    with pytest.raises(UserError, match="the run on 2 ranks failed: no memory"):
+    assert [run["ranks"] for run in found] == [1] and failed == {2: "solver scaling: no memory"}
+    with pytest.raises(UserError, match="the run on 2 ranks failed: .*: no memory"):
         launch.measure_each({2: ["builtin:bar"]})
     monkeypatch.setattr(launch.shutil, "which", lambda _: None)
     with pytest.raises(UserError, match="no mpiexec on PATH"):
