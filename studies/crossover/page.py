@@ -39,7 +39,8 @@ def page(study: Crossover, tables: dict[str, Table]) -> StudyPage:
             section(
                 "Verdict",
                 note(study.without),
-                prose(" ".join(verdict(study.runs)), disturbed(runs.rows)),
+                prose(" ".join(verdict(study.runs))),
+                note(disturbed(runs.rows)),
                 grid(tables["methods"]),
             ),
             section("Fastest", *grids),
@@ -63,8 +64,8 @@ def disturbed(rows: list[Row]) -> str:
     if not count:
         return ""
     return (
-        f"Beside {count} of {len(ended)} runs other programs had more than "
-        f"{DISTURBING:g} cores, up to {max(ended):.1f}: their wall times are too long."
+        f"Beside {count} of {len(ended)} runs other programs had more than {DISTURBING:g} cores, "
+        f"up to {max(ended):.1f}: these wall times are too long, and which is the fastest is unsure."
     )
 
 

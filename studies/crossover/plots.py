@@ -66,7 +66,7 @@ def _figure(
     figure, axes = plt.subplots(
         max(1, len(groups)),
         len(modes),
-        figsize=(max(4.6, 3.9 * len(modes)), 0.3 + 2.7 * len(groups)),
+        figsize=(max(4.6, 3.9 * len(modes)), 0.3 + 2.7 * max(1, len(groups))),
         sharex=True,
         sharey=True,
         squeeze=False,

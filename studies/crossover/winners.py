@@ -141,9 +141,9 @@ def _corrected(best: pd.DataFrame) -> str:
 def _auto(best: pd.DataFrame) -> str:
     own = best.dropna(subset=["times_auto"])
     if own.empty:
-        return "What --method auto chooses was not run, or missed its tolerance."
+        return "What auto chooses was not run, or missed its tolerance."
     good = int((own["times_auto"] <= AS_FAST).sum())
-    sentence = "--method auto chooses the fastest, or one that takes 10 % more at most, in "
+    sentence = "The method that auto chooses is the fastest, or takes 10 % more at most, in "
     sentence += f"{good} of {_cells(len(own))}"
     if good == len(own):
         return f"{sentence}."
