@@ -65,7 +65,7 @@ def disturbed(rows: list[Row]) -> str:
         return ""
     return (
         f"Beside {count} of {len(ended)} runs other programs had more than {DISTURBING:g} cores, "
-        f"up to {max(ended):.1f}: these wall times are too long, and which is the fastest is unsure."
+        f"up to {max(ended):.1f}: their wall times are too long, and winners uncertain."
     )
 
 
