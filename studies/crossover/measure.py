@@ -19,16 +19,17 @@ from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
 from carillon.processes.children import run_child
+from solver.analysis.faster_method import FEWEST_UNKNOWNS
 from solver.analysis.options import SolverOptions
 from studies.crossover.config import Launch
-from studies.crossover.methods import METHODS, PLAIN, REFERENCE
+from studies.crossover.methods import CHOICES, METHODS, PLAIN, REFERENCE
 from studies.crossover.rank import FILES
 from studies.scaling.launch import ANY_RANKS, LAUNCHER, failure_of
 from workflow.arguments import options
 
 Row = dict[str, Any]
-NO_SOLUTION = ("mesh", "material", "inertia", "verification")
-"""Phases of a run that are no part of its solution: they make the moduli, or check the modes."""
+NO_SOLUTION = ("start", "solid", "inertia", "verification", "estimate", "writing", "other")
+"""Phases of a run that are no part of its solution: they make the solid, or check the modes."""
 WARM_UP = ["builtin:bar", "--resolution", "12", "--modes", "20", "--no-estimate"]
 """What every method solves first, untimed, so that its kernels are compiled."""
 LATE = "it was ended after {:g} s"
@@ -78,12 +79,15 @@ class Runner:
                 return {"problem": problem}
             used = [json.loads(each.read_text()) for each in Path(place).glob(FILES)]
         summary = json.loads(done.stdout[done.stdout.index("{") :])
-        phases = summary["timings"].items()
+        phases = summary["phases_by_rank"].items()
         own = sum(each["processor_seconds"] for each in used)
         return {
             "unknowns": summary["n_dofs"],
+            "took": summary["method"],
             "threads": threads,
-            "seconds": sum(spent for phase, spent in phases if phase not in NO_SOLUTION),
+            "seconds": sum(
+                max(each["seconds"]) for name, each in phases if name not in NO_SOLUTION
+            ),
             "whole_seconds": whole,
             "processor_seconds": own or None,
             "others": max(busy - own, 0.0) / whole if self.launch.nodes == 1 else None,
@@ -106,20 +110,16 @@ def launcher_words(launch: Launch) -> list[str]:
     return [program, *words[1:]]
 
 
-def choice_of_auto(modes: int, tolerance: float, unknowns: int) -> str | None:
-    """Name of the method that `--method auto` is; None if it is none of them.
+def choice_of_auto(modes: int, tolerance: float, unknowns: int) -> str:
+    """Name of the method that `--method auto` is for a solid of few unknowns.
 
     Examples
     --------
-    >>> choice_of_auto(20, 1e-6, 30)
-    'hcms_ec'
+    >>> choice_of_auto(20, 1e-6, 30), choice_of_auto(20, 1e-6, 3000)
+    ('hcms_ec', 'lanczos')
     """
-
-    def resolved(**chosen: Any) -> SolverOptions:
-        return SolverOptions(modes=modes, tolerance=tolerance, **chosen).with_method(unknowns)
-
-    auto = resolved()
-    return next((name for name, each in METHODS.items() if resolved(**each.options) == auto), None)
+    chosen = SolverOptions(modes=modes, tolerance=tolerance).with_method(unknowns)
+    return CHOICES[chosen.method]
 
 
 def _busy_seconds() -> float:
@@ -156,8 +156,26 @@ def measure_case(runner: Runner, solid: Sequence[str], part: Mapping[str, Any]) 
         found: list[Row] = []
         for name in methods:
             found += _runs_of(runner, solid, modes, name, part, [*rows, *found])
-        rows += _judged(found)
+        known = next((row["unknowns"] for row in found if "unknowns" in row), 0)
+        choices = {
+            tolerance: _choice(runner, solid, modes, tolerance, known)
+            for tolerance in part["tolerances"]
+        }
+        rows += _judged(found, choices)
     return rows
+
+
+def _choice(
+    runner: Runner, solid: Sequence[str], modes: int, tolerance: float, unknowns: int
+) -> str | None:
+    """Name of the method that `auto` takes; None if that cannot be told.
+
+    That of a large solid depends on the work of its factorisation, and is what a run takes.
+    """
+    if unknowns < FEWEST_UNKNOWNS:
+        return choice_of_auto(modes, tolerance, unknowns) if unknowns else None
+    row = runner.run([*solid, *options({"modes": modes, "tolerance": tolerance})])
+    return CHOICES.get(row.get("took", ""))
 
 
 def _runs_of(
@@ -197,10 +215,11 @@ def _fastest_of(count: int, runner: Runner, words: Sequence[str]) -> Row:
     return best
 
 
-def _judged(rows: list[Row]) -> list[Row]:
+def _judged(rows: list[Row], choices: Mapping[float, str | None]) -> list[Row]:
     """The rows of one number of modes with what is said of their errors, see `measure_case`.
 
     The reference is SLEPc's run to the smallest tolerance, or else that of any other method.
+    `choices` are the methods that `auto` takes, by tolerance.
     """
     solved = [row for row in rows if "problem" not in row]
     if not solved:
@@ -213,9 +232,8 @@ def _judged(rows: list[Row]) -> list[Row]:
     judged = []
     for row in rows:
         row = {**row, "unknowns": best["unknowns"]}
-        row["auto"] = row["method"] == choice_of_auto(
-            row["modes"], row["tolerance"], row["unknowns"]
-        )
+        row["auto"] = row["method"] == choices.get(row["tolerance"])
+        row.pop("took", None)
         frequencies = row.pop("frequencies", None)
         if frequencies is not None:
             error = float(np.abs(np.square(frequencies)[RIGID_MODES:] / exact - 1.0).max())

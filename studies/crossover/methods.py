@@ -15,7 +15,7 @@ class SolverMethod:
     label: str
     """Its name for people."""
     options: Mapping[str, Any]
-    """Fields of `SolverOptions` that choose it."""
+    """Options of the command that choose it."""
 
 
 METHODS = {
@@ -23,8 +23,11 @@ METHODS = {
     CORRECTED: SolverMethod("HCMS + EC", {"method": "hcms"}),
     "lanczos": SolverMethod("Block Lanczos", {"method": "lanczos"}),
     "lobpcg": SolverMethod("LOBPCG", {"method": "lobpcg"}),
+    "coarse_lobpcg": SolverMethod("Coarse modes + LOBPCG", {"method": "lobpcg", "refine": True}),
     "hcms_lobpcg": SolverMethod("HCMS + LOBPCG", {"method": "hcms", "linear_solver": "amg-cg"}),
     REFERENCE: SolverMethod("SLEPc", {"method": "slepc"}),
     "arpack": SolverMethod("ARPACK", {"method": "arpack"}),
 }
 """All methods by their names in the configuration."""
+CHOICES = {"hcms": CORRECTED, "lanczos": "lanczos", "lobpcg": "coarse_lobpcg"}
+"""What the method is here that `auto` takes of a solid of voxels, by its name in the solver."""

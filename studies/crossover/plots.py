@@ -20,6 +20,7 @@ LOOKS = {
     "hcms_ec": ("o", COLOURS["hcms_ec"]),
     "lanczos": ("s", COLOURS["fastest"]),
     "lobpcg": ("D", COLOURS["ddfem_hcms_ec"]),
+    "coarse_lobpcg": ("P", COLOURS["ddfem_hcms_ec_accurate"]),
     "hcms_lobpcg": ("D", COLOURS["random"]),
     "slepc": ("^", COLOURS["ddfem_slepc"]),
     "arpack": ("v", COLOURS["truth"]),
