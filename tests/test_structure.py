@@ -112,7 +112,7 @@ ARROWS = {
     #
     "workflow.configuration": "dataset_gen dataset_gen.objectives",
     "workflow": "forests workflow.configuration",
-    "workflow.estimate": "workflow",
+    "workflow.estimate": "solver workflow",
     "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
     "workflow.scripts": "workflow.report studies.base",
     "workflow.validation": """solver.files solver.refinement solver.response solver.verification

@@ -110,6 +110,52 @@ def test_more_cores_shorten_what_has_jobs_for_them(configs):
     assert many["wall_hours"] >= many["longest_job_hours"]
 
 
+def on_ranks(config, ranks):
+    """The configuration with every solver run on so many ranks of one core each."""
+    config = copy.deepcopy(config)
+    config["solver"] |= {"ranks": ranks, "cores": ranks}
+    return config
+
+
+def test_more_ranks_take_fewer_hours_and_no_fewer_core_hours(configs):
+    one, four, many = (
+        stages(on_ranks(configs["laptop"], ranks), (16, 4))["ground truth"] for ranks in (1, 4, 16)
+    )
+    assert one["longest_job_hours"] > four["longest_job_hours"] > many["longest_job_hours"]
+    assert one["core_hours"] <= four["core_hours"] <= many["core_hours"]
+    assert one["ranks"] == 1 and one["rank_speed_up"] == [1.0, 1.0]
+    assert four["ranks"] == 4 and 1.5 < four["rank_speed_up"][0] <= four["rank_speed_up"][1] < 4.0
+
+
+def test_a_job_that_starts_no_ranks_is_not_faster_by_them(configs):
+    jobs = costed(on_ranks(configs["laptop"], 4), (16, 4)).set_index("kind")
+    assert set(jobs.loc["follow_convergence", "rank_speed_up"]) == {1.0}
+    assert (jobs.loc["find_modes truth", "rank_speed_up"] > 1.5).all()
+
+
+def test_what_was_measured_on_ranks_is_not_taken_as_on_one(configs):
+    config = on_ranks(configs["laptop"], 4)
+    jobs = costed(config, (16, 4))
+    truth = jobs[jobs["kind"] == "find_modes truth"].iloc[0]
+    medians = load_medians()
+    medians.loc["find_modes truth", ["work", "seconds", "speed_up"]] = (
+        truth["work"],
+        100.0,
+        truth["speed_up"],
+    )
+    again = costed(config, (16, 4), medians)
+    hours = again.loc[truth.name, "hours"]
+    assert hours == pytest.approx(100.0 / 3600.0)
+
+
+def test_the_text_says_how_much_faster_ranks_are(tmp_path, capsys):
+    Path(tmp_path, "ranks.yaml").write_text(
+        "models: {bar: {mesh: 'builtin:bar', resolution: 24}}\nsolver: {ranks: 2, cores: 2}\n"
+    )
+    assert main(["estimate", "--configfile", str(tmp_path / "ranks.yaml")]) == 0
+    assert "ground truth: on 2 ranks 1." in capsys.readouterr().out
+
+
 def test_forests_that_exist_are_not_trained(config):
     config["forests"]["model"] = "default"
     names = list(stages(config))

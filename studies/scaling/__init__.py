@@ -9,4 +9,8 @@ COMMANDS = {
         ranks=True,
         room="solver",
     ),
+    "speed-up": Command(
+        "studies.scaling.speed_up",
+        "modelled speed-up on many ranks and what limits it, without a run",
+    ),
 }

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from solver import rank_scaling
 from solver.hcms.counts import SENT_A_COLUMN, SHARED_COST
+from solver.rank_scaling import BANDWIDTH, LATENCY
 from studies.scaling.work import Work
 
-ASSUMED_LATENCY, ASSUMED_BANDWIDTH = 2e-6, 5e9
-"""Latency of a message [s] and bandwidth [B/s] where only one rank was measured."""
 MISFIT_LIMIT = 0.3
 """Largest relative difference from the measurements with which the model goes beyond them."""
 MODELLED = ("assembly", "local", "merge", "down", "basis", "factor", "solve", "dense")
@@ -29,9 +29,10 @@ ASSUMPTIONS = (
     "are those of a compact group of so many nodes and modes",
     f"an eigenproblem shared by ranks takes {SHARED_COST:g} times as many operations, as on two "
     f"ranks here, evenly divided, and {SENT_A_COLUMN} messages a column and direction of the grid",
-    "factorisation and solves are those of a compact solid and divide evenly over the ranks; their "
-    "messages are the separators of the log2(ranks) uppermost levels of nested dissection",
-    "a collective call takes log2(ranks) rounds of its whole payload",
+    *rank_scaling.ASSUMPTIONS,
+    "shared fronts are wider than where planes cut the solid, the more so the larger it is, since "
+    "the parts of ranks are made of subdomains",
+    "a sum over the ranks takes log2(ranks) rounds of its whole payload",
     "corrections and right-hand sides are as many as were measured on the fewest ranks",
     "there are as many subdomains as ranks at least, which are then smaller",
     "partition and elimination plan are not in it: they are made once for any material",
@@ -50,9 +51,9 @@ class MachineRates:
 
     rates: dict[str, float]
     """Operations per second by kind of phase."""
-    latency: float = ASSUMED_LATENCY
+    latency: float = LATENCY
     """Seconds a message."""
-    bandwidth: float = ASSUMED_BANDWIDTH
+    bandwidth: float = BANDWIDTH
     """Bytes per second."""
 
     def predict(self, work: Work) -> dict[str, float]:
@@ -98,7 +99,7 @@ def fit_machine(
         name: flops[name] / seconds[name] if flops[name] > 0.0 else np.inf for name in MODELLED
     }
     links = [run["link"] for run, _ in fair if run["link"] is not None]
-    measured = {"latency": ASSUMED_LATENCY, "bandwidth": ASSUMED_BANDWIDTH}
+    measured = {"latency": LATENCY, "bandwidth": BANDWIDTH}
     if links:
         measured = {name: float(np.median([link[name] for link in links])) for name in measured}
     return MachineRates(

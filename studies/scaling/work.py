@@ -1,9 +1,8 @@
 """Operations, bytes and messages of the busiest rank in every phase, counted without doing them.
 
 They follow from the nodes of the groups of a merge tree, from the solver's own schedule of merges,
-and from closed forms for compact solids: a group of n nodes has 6 n^(2/3) on its boundary, and
-nested dissection starts with a separator of s = 3 n^(2/3) unknowns, so that a factorisation takes
-about 4 s^3 operations and its factor has 2 s^2 entries.
+and from closed forms for compact solids: a group of n nodes has 6 n^(2/3) on its boundary; the
+correction is that of `solver.rank_scaling`.
 """
 
 from __future__ import annotations
@@ -25,12 +24,11 @@ from solver.hcms.counts import (
 )
 from solver.hcms.schedule import planned_modes, schedule
 from solver.hcms.synthesis import local_steps
+from solver.rank_scaling import DENSE_PROBLEM, Share, factorisation, products, solves
 
 REAL_BYTES = 8
 MERGE_MESSAGES = 10
 """Messages that a rank sends for a merge with the group of another."""
-DENSE_PROBLEMS = 3
-"""Dense eigenproblems of the Krylov space that a correction solves on one rank."""
 
 Work = dict[str, Tally]
 
@@ -130,37 +128,22 @@ def _product_flops(nodes: Sequence[float], modes: list[int], step: Merge, root: 
 
 
 def _correction(unknowns: float, largest: float, request: Request, ranks: int) -> Work:
-    """Work of the block Lanczos iteration, where the busiest rank has `largest` of the unknowns.
-
-    The ranks share factorisation, solves, the projection of every block on all before it and the
-    modes; the dense problems of the Krylov space are the first rank's.
-    """
-    blocks, solves = request.blocks, request.solves
-    columns = solves / max(blocks, 1)
-    rounds = (ranks - 1).bit_length()
-    separator = 3.0 * (unknowns / 3.0) ** (2.0 / 3.0)
-    fronts = [separator * 0.5 ** (2.0 * level / 3.0) for level in range(rounds)]
-    shared = 2.0 * solves**2 + 6.0 * columns * solves + 2.0 * solves * request.width
-    alone = DENSE_PROBLEMS * eigen_flops(solves, False)
-    outside = 3.0 * _boundary(largest / 3.0) if ranks > 1 else 0.0
-    reduced = rounds * solves * (0.5 * solves + 2.0 * columns)
+    """Work of the block Lanczos iteration, where the busiest rank has `largest` of the unknowns."""
+    blocks, columns = request.blocks, request.solves
+    own, shared = factorisation(unknowns, ranks, planes=False)
+    dense = products(largest, ranks, blocks, columns, request.width)
+    alone = Share(DENSE_PROBLEM * float(columns) ** 3)
     return {
-        "factor": Tally(
-            rounds,
-            REAL_BYTES * sum(0.5 * front**2 for front in fronts),
-            4.0 * separator**3 / ranks,
-        ),
-        "solve": Tally(
-            2 * rounds * max(blocks, 1),
-            REAL_BYTES * sum(2.0 * front * solves for front in fronts),
-            8.0 * separator**2 * solves / ranks,
-        ),
-        "dense": Tally(
-            6 * rounds * blocks,
-            REAL_BYTES * (4.0 * outside * solves + reduced),
-            largest * shared + alone,
-        ),
+        "factor": _tally(own, shared),
+        "solve": _tally(solves(unknowns, ranks, blocks, columns, planes=False)),
+        "dense": _tally(dense, alone),
     }
+
+
+def _tally(*shares: Share) -> Tally:
+    """Work that one rank does one after the other."""
+    flops, size, messages = (sum(each) for each in zip(*shares, strict=True))
+    return Tally(messages, size, flops)
 
 
 def _boundary(nodes: float) -> float:

@@ -14,6 +14,7 @@ from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
 from carillon.processes.threads import allowed_cores
+from solver.rank_scaling import ALONE, speed_up, thread_speed_up
 from workflow import settings
 from workflow.estimate.jobs import RESULTS, plan
 
@@ -59,13 +60,17 @@ class Law(NamedTuple):
         Power of every size, which are numbers of the job's command by their option and `unknowns`
         of its solid.
     shared
-        Whether twice the cores take half the time; other jobs take the same time on more cores.
+        Whether twice the cores take half the time.
+    ranked
+        Whether ranks and their threads shorten the time as `solver.rank_scaling` says; a job that
+        is neither takes the same time on more cores.
     """
 
     stage: str
     time: dict[str, float] = {}
     files: dict[str, float] = {}
     shared: bool = False
+    ranked: bool = False
 
 
 _OTHERS = Law("tables, pictures, report")
@@ -78,10 +83,10 @@ LAWS = {
     "grow_tree": Law("growing trees", {"growing": 1.0}, {"leaves": 1.0}, True),
     "train_forests": Law("fitting leaves", {"fitting": 1.0}, {"leaves": 1.0}, True),
     "rate_forests": Law("errors on single blocks", {"blocks": 0.75, "materials": 1.0}),
-    "find_modes": Law(_VARIANTS, _SOLVE, {"unknowns": 1.0, "modes": 1.0}),
-    "find_modes truth": Law("ground truth", _SOLVE, {"unknowns": 1.0, "modes": 1.0}),
-    "follow_convergence": Law(_VARIANTS, _SOLVE | {"steps": 0.8}),
-    "time_methods": Law(_VARIANTS, _SOLVE | {"runs": 1.0, "tune": 1.0}),
+    "find_modes": Law(_VARIANTS, _SOLVE, {"unknowns": 1.0, "modes": 1.0}, ranked=True),
+    "find_modes truth": Law("ground truth", _SOLVE, {"unknowns": 1.0, "modes": 1.0}, ranked=True),
+    "follow_convergence": Law(_VARIANTS, _SOLVE | {"steps": 0.8}, ranked=True),
+    "time_methods": Law(_VARIANTS, _SOLVE | {"runs": 1.0, "tune": 1.0}, ranked=True),
     "measure_scaling": Law(_VARIANTS, _SOLVE | {"ranks": 1.0, "weak": 1.0}),
     "compare_with_truth": Law(_OTHERS.stage, _READ),
     "audit_spectra": Law("validation", _READ),
@@ -95,24 +100,32 @@ STAGES = list(dict.fromkeys(law.stage for law in LAWS.values()))
 def with_work(jobs: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
     """The jobs of `plan` with their `stage`, and what their time and their files grow with.
 
-    `work` and `content` have no unit; `kind` is that of a rule that others are made from.
+    `work` and `content` have no unit; `kind` is that of a rule that others are made from. By
+    `rank_speed_up` and `speed_up` a solve is faster than on one rank, and than on one core.
     """
     kinds = jobs["kind"].str.replace("_(in_full|of_run)$", "", regex=True)
     laws = [LAWS.get(kind, LAWS.get(kind.split(" ")[0], _OTHERS)) for kind in kinds]
     sizes = [_sizes(job, config) for job in jobs.itertuples()]
+    gains = [
+        _gains(job.cores, job.ranks, each) if law.ranked else (1.0, 1.0)
+        for law, job, each in zip(laws, jobs.itertuples(), sizes)
+    ]
     shares = [cores if law.shared else 1 for law, cores in zip(laws, jobs["cores"])]
     return jobs.assign(
         kind=kinds,
         stage=[law.stage for law in laws],
         work=[_product(law.time, each) / n for law, each, n in zip(laws, sizes, shares)],
         content=[_product(law.files, each) for law, each in zip(laws, sizes)],
+        rank_speed_up=[by_ranks for by_ranks, _ in gains],
+        speed_up=[by_ranks * by_threads for by_ranks, by_threads in gains],
     )
 
 
 def load_medians(folders: Iterable[str | Path] = ()) -> pd.DataFrame:
     """Medians by kind of `work` and its `seconds`, of `content` and the `megabytes` of its files.
 
-    Those of former results in `folders` replace the packaged ones.
+    `speed_up` is that of the ranks and threads which the work was measured on. Those of former
+    results in `folders` replace the packaged ones.
 
     Raises UserError if a folder holds no results of a run.
     """
@@ -127,12 +140,14 @@ def load_medians(folders: Iterable[str | Path] = ()) -> pd.DataFrame:
 def with_costs(jobs: pd.DataFrame, medians: pd.DataFrame) -> pd.DataFrame:
     """The jobs of `with_work` with `known`, `core_hours`, `hours`, `memory_gb`, `kept_gb`.
 
-    `times` is their work over that of the median. A job that is not known takes a few seconds, or
-    the limit of its rule if that has one.
+    `times` is their work over that of the median; its seconds count by what ranks and threads make
+    of it there and here. A job that is not known takes a few seconds, or the limit of its rule if
+    that has one.
     """
     of_kind = medians.reindex(jobs["kind"]).set_index(jobs.index)
     times = jobs["work"] / of_kind["work"]
-    seconds = START + (of_kind["seconds"] - START).clip(lower=0.0) * times
+    slower = times * of_kind["speed_up"] / jobs["speed_up"]
+    seconds = START + (of_kind["seconds"] - START).clip(lower=0.0) * slower
     limits = (60.0 * jobs["minutes"].astype(float)).fillna(OTHER_SECONDS)
     hours = seconds.fillna(limits) / 3600.0
     megabytes = of_kind["megabytes"] * jobs["content"] / of_kind["content"]
@@ -173,6 +188,14 @@ def benchmarked_seconds(file: Path) -> float:
         return float(pd.read_csv(file, sep="\t", nrows=1)["s"].iloc[0])
     except (ValueError, LookupError, OSError):
         raise UserError(f"{file}: expected a benchmark file of Snakemake") from None
+
+
+def _gains(cores: int, ranks: int, sizes: Mapping[str, float]) -> tuple[float, float]:
+    """How many times as fast a solve is by its ranks, as far as they have cores, and by threads."""
+    ranks = min(ranks, cores)
+    unknowns, modes = sizes.get("unknowns", 1.0), sizes.get("modes", 1.0)
+    by_ranks = speed_up(unknowns, modes, ranks, ALONE * unknowns)
+    return by_ranks, thread_speed_up(cores // ranks)
 
 
 def _product(powers: Mapping[str, float], sizes: Mapping[str, float]) -> float:

@@ -27,9 +27,10 @@ TARGETS = ("all", "figures")
 def plan(config: Mapping[str, Any], cores_per_node: int, cores: int | None = None) -> pd.DataFrame:
     """Jobs of a complete configuration, whose meshes may be absent.
 
-    Columns are `kind`, the rule, with the variant of a model's modes; `model` (or empty), `target`
-    and `cores`; `memory_mb` and `minutes`, the limits if there are any; `command` (of a shell, or
-    empty); `outputs` and `benchmark`, its files below the folder `results`.
+    Columns are `kind`, the rule, with the variant of a model's modes; `model` (or empty), `target`,
+    `cores`, and `ranks` that share them; `memory_mb` and `minutes`, the limits if there are any;
+    `command` (of a shell, or empty); `outputs` and `benchmark`, its files below the folder
+    `results`.
 
     Raises UserError if the rules do not accept the configuration.
 
@@ -120,6 +121,7 @@ def described(job: Any) -> dict[str, Any]:
         "kind": f"{job.rule.name} {job.wildcards_dict.get('variant', '')}".strip(),
         "model": job.wildcards_dict.get("model", ""),
         "cores": job.threads,
+        "ranks": int(job.resources.get("tasks") or 1),
         "memory_mb": requested_memory(job.resources),
         "minutes": job.resources.get("runtime"),
         "command": job.shellcmd or "",

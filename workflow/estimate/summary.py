@@ -43,6 +43,7 @@ def summarised(jobs: pd.DataFrame, cores: int) -> dict[str, Any]:
                 "longest_job_hours": same["hours"].max(),
                 "memory_gb": same["memory_gb"].max(),
                 "kept_gb": same["kept_gb"].sum(),
+                **_of_ranks(same),
             }
             rows.append(row)
     return {
@@ -50,6 +51,18 @@ def summarised(jobs: pd.DataFrame, cores: int) -> dict[str, Any]:
         "totals": _totals(rows),
         "run_totals": _totals([row for row in rows if row["target"] == TARGETS[0]]),
         "cautions": list(_cautions(jobs)),
+    }
+
+
+def _of_ranks(jobs: pd.DataFrame) -> dict[str, Any]:
+    """Most ranks of a job, and least and greatest `rank_speed_up` of the jobs with several."""
+    several = jobs[(jobs["ranks"] > 1) & (jobs["rank_speed_up"] != 1.0)]
+    if several.empty:
+        return {"ranks": 1, "rank_speed_up": [1.0, 1.0]}
+    gains = several["rank_speed_up"]
+    return {
+        "ranks": int(several["ranks"].max()),
+        "rank_speed_up": [float(gains.min()), float(gains.max())],
     }
 
 
@@ -85,6 +98,7 @@ def as_text(result: Mapping[str, Any], title: str) -> str:
             HEADER,
             *map(_line, rows),
             RECKONED.format(run_name),
+            *(_ranks_line(row) for row in result["stages"] if row["ranks"] > 1),
             *(f"note: {caution}" for caution in result["cautions"]),
         ]
     )
@@ -96,6 +110,12 @@ def _line(row: Mapping[str, Any]) -> str:
         f"{row['stage']:<25}{row['jobs']:>6,}{hours}{_size(row['memory_gb']):>10}"
         f"{_size(row['kept_gb']):>10}"
     )
+
+
+def _ranks_line(row: Mapping[str, Any]) -> str:
+    least, most = (f"{gain:.1f}" for gain in row["rank_speed_up"])
+    gain = least if least == most else f"{least} to {most}"
+    return f"{row['stage']}: on {row['ranks']} ranks {gain} times as fast as on one, by a model"
 
 
 def duration(hours: float) -> str:
