@@ -108,7 +108,7 @@ def test_density_gives_way_to_bounds_of_the_moduli(tmp_path, discretisation):
 @pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
 def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation):
     """Targets of a bar whose Poisson's ratio is another than that of the start."""
-    made = small_project.project(tmp_path, evaluations=60)
+    made = small_project.project(tmp_path, evaluations=90)
     resolution = 16 if discretisation == "voxel" else 12
     made = replace(made, discretisation=discretisation, resolution=resolution)
     targets = small_project.targets(replace(made, poisson=0.42))

@@ -26,8 +26,8 @@ FOLLOWED = 50.0
 """Factor of `NEARLY_ACCURATE` where there is an inverse for a similar material."""
 WORTH_INEXACT = 50.0
 """Largest error, as a multiple of the tolerance, at which that inverse serves for a second step."""
-GETS_ON = 0.3
-"""Share of the error that a further step with that inverse may have left."""
+INEXACT_STEPS = 4
+"""Largest number of steps that it serves for: what then is not accurate is not going to be."""
 SHIFT_FRACTION = 0.52
 """Shift of an indefinite factorisation, as a share of the last requested eigenvalue."""
 TOP, TOP_FRACTION, HIGHEST_TOP_SHIFT = 0.8, 0.98, 1.1
@@ -202,7 +202,7 @@ class SubspaceIteration:
         """Inverse for a step: the one for a similar material as long as that gets on."""
         similar = None if self.made is not None else self.similar
         near = step == 0 or self.history[-1] <= WORTH_INEXACT * tolerance
-        near &= step < 2 or self.history[-1] <= GETS_ON * self.history[-2]
+        near &= step < INEXACT_STEPS
         if similar is not None and near and not self._too_high(similar):
             ritz = self.ritz
             return Approximate(similar, self.system, ritz.vectors, ritz.mass_vectors)
