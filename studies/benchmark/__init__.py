@@ -9,4 +9,9 @@ COMMANDS = {
         ranks=True,
         room="solver",
     ),
+    "benchmark-direct": Command(
+        "studies.benchmark.direct_command",
+        "time the factorisation and its solves beside other direct solvers",
+        room="solver",
+    ),
 }

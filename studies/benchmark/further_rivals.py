@@ -24,6 +24,18 @@ class UnavailableError(ConvergenceError):
     """A rival that cannot be tried here; told like one that fails."""
 
 
+def require_packages(*packages: str) -> None:
+    """Raise UnavailableError unless optional Python packages can be loaded."""
+    for package in packages:
+        try:
+            import_module(package)
+        except (ImportError, OSError) as error:  # OSError: a library that it needs.
+            raise UnavailableError(
+                f"{package} cannot be loaded ({one_line(str(error))}); install it by pip "
+                f"install -r {REQUIREMENTS}"
+            ) from None
+
+
 @dataclass(frozen=True)
 class FurtherRival:
     """A general eigensolver."""
@@ -45,14 +57,7 @@ class FurtherRival:
         """Raise UnavailableError unless it runs here."""
         if ranks > 1:
             raise UnavailableError(f"runs on one rank, not on {ranks}")
-        for package in self.packages:
-            try:
-                import_module(package)
-            except (ImportError, OSError) as error:  # OSError: a library that it needs.
-                raise UnavailableError(
-                    f"{package} cannot be loaded ({one_line(str(error))}); install it by pip "
-                    f"install -r {REQUIREMENTS}"
-                ) from None
+        require_packages(*self.packages)
         if self.eps_type is not None:
             solver = SLEPc.EPS().create(MPI.COMM_SELF)
             try:
@@ -73,6 +78,9 @@ RIVALS = {
     "scipy_superlu": FurtherRival(
         "ARPACK by SciPy in shift-and-invert mode, factorised by SuperLU",
         python_rivals.arpack_superlu,
+    ),
+    "scipy_pardiso": FurtherRival(
+        "the same, factorised by MKL's PARDISO", python_rivals.arpack_pardiso, ("pypardiso",)
     ),
     "scipy_lobpcg": FurtherRival(
         "LOBPCG by SciPy, preconditioned by PyAMG's smoothed aggregation",

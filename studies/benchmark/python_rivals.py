@@ -1,4 +1,4 @@
-"""Rivals from Python packages: ARPACK with SuperLU and LOBPCG with PyAMG by SciPy, and PRIMME.
+"""Rivals from Python packages: ARPACK with SuperLU or PARDISO, LOBPCG with PyAMG, and PRIMME.
 
 PRIMME's block Davidson method is that of Stathopoulos & McCombs 2010.
 """
@@ -8,10 +8,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
+from carillon.processes.threads import allowed_threads
+from studies.benchmark.pardiso import Pardiso
 from studies.benchmark.search import Array, Pairs, RivalSearch, ascending
 
 LANCZOS_VECTORS = 1.5
@@ -34,12 +37,21 @@ BASIS = 1.25
 
 def arpack_superlu(search: RivalSearch) -> Pairs:
     """`eigsh` in shift-and-invert mode, with SuperLU told that the matrix is symmetric."""
-    factor = sla.splu(
-        search.shifted.tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    return _arpack(search, symmetric_superlu(search.shifted.tocsc()).solve)
+
+
+def arpack_pardiso(search: RivalSearch) -> Pairs:
+    """The same with PARDISO, which factorises K + sigma M as a definite matrix."""
+    factor = Pardiso(search.shifted, definite=True, threads=allowed_threads())
+    try:
+        factor.analyse()
+        factor.factorise()
+        return _arpack(search, factor.solve)
+    finally:
+        factor.destroy()
+
+
+def _arpack(search: RivalSearch, solve: Callable[[Array], Array]) -> Pairs:
     count = search.count + RIGID_MODES
     vectors = max(round(LANCZOS_VECTORS * count), count + FEWEST_MORE)
     values, modes = sla.eigsh(
@@ -47,13 +59,23 @@ def arpack_superlu(search: RivalSearch) -> Pairs:
         count,
         search.M,
         sigma=-search.shift,
-        OPinv=search.operator(factor.solve),
+        OPinv=search.operator(solve),
         v0=search.start(1)[:, 0],
         ncv=min(vectors, len(search.scale)),
         tol=search.tolerance,
     )
     values, modes = ascending(values, modes)
     return values[RIGID_MODES:], modes[:, RIGID_MODES:]
+
+
+def symmetric_superlu(matrix: sp.csc_matrix) -> sla.SuperLU:
+    """LU of a symmetric matrix by SuperLU: minimum degree, and pivots on the diagonal."""
+    return sla.splu(
+        matrix,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
 
 
 def lobpcg_multigrid(search: RivalSearch) -> Pairs:
