@@ -89,9 +89,7 @@ class PetscCholesky(DirectSolver):
         if not PETSc.Sys.hasExternalPackage(PACKAGES[package]):
             raise UnavailableError(f"this PETSc was built without {PACKAGES[package]}")
         if package == "cholmod" and not shifted.definite:
-            raise UnavailableError(
-                "factorises definite matrices alone: it needs a shift below all eigenvalues (--definite)"
-            )
+            raise UnavailableError("needs a shift below all eigenvalues (--definite)")
         system = shifted.system
         self._package, self._comm = package, system.comm
         self._matrix = system.K.copy()
