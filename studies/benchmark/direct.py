@@ -95,11 +95,12 @@ def _row(
     the largest |b - A x| / |b| in the 2-norm.
     """
     runs: list[Steps] = []
-    residual = 0.0
+    residual, operations = 0.0, None
     for number in range(options.warm_up + options.runs):
         solver = make(shifted)
         try:
             took, worst = _run(solver, shifted, rhs)
+            operations = solver.operations if operations is None else operations
         finally:
             solver.destroy()
         if solver.first_factorises:
@@ -113,7 +114,7 @@ def _row(
         for name in runs[0]
         for index, kind in enumerate(("wall", "processor"))
     }
-    gigaflop = None if solver.operations is None else 1e-9 * solver.operations
+    gigaflop = None if operations is None else 1e-9 * operations
     return medians | {
         "gigaflop": gigaflop,
         "gflops": gigaflop and gigaflop / medians["wall_factorisation"],

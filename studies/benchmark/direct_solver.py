@@ -12,10 +12,13 @@ class DirectSolver:
     """Memory order of blocks of right-hand sides."""
     first_factorises = False
     """Whether `analyse` cannot but factorise, too."""
-    operations: float | None = None
-    """Floating-point operations of a factorisation; None if the solver does not count."""
     entries: int
-    """Entries of the factor; known once it is there, as operations are."""
+    """Entries of the factor; known once it is there."""
+
+    @property
+    def operations(self) -> float | None:
+        """Floating-point operations of a factorisation; None if the solver does not count."""
+        return None
 
     def analyse(self) -> None:
         """Do what depends on the sparsity alone, if that can be had separately."""

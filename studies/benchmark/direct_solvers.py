@@ -67,7 +67,6 @@ class Multifrontal(DirectSolver):
         self._tree = RankTree(self._shifted.layout)
         plan = self._tree.plan
         plan.shares(self._shifted.threads)
-        self.operations = plan.operations
         self.entries = int(plan.pivot_offset[-1] + plan.coupling_offset[-1])
 
     def factorise(self) -> None:
@@ -78,6 +77,11 @@ class Multifrontal(DirectSolver):
     def solve(self, block: Array) -> Array:
         """See `DirectSolver.solve`."""
         return np.asarray(self._factor.solve(block))
+
+    @property
+    def operations(self) -> float:
+        """See `DirectSolver.operations`."""
+        return self._tree.plan.operations
 
 
 class PetscCholesky(DirectSolver):
@@ -128,11 +132,16 @@ class PetscCholesky(DirectSolver):
             raise ConvergenceError(f"MUMPS: INFOG(1) = {status}")
         entries = self._factor.getMumpsInfog(_MUMPS_ENTRIES)
         self.entries = entries if entries >= 0 else -1_000_000 * entries
-        self.operations = float(self._factor.getMumpsRinfog(_MUMPS_OPERATIONS))
 
     def solve(self, block: Array) -> Array:
         """See `DirectSolver.solve`."""
         return solve_dense(self._factor, block, len(block), self._comm)
+
+    @property
+    def operations(self) -> float | None:
+        """See `DirectSolver.operations`."""
+        mumps = self._package == "mumps"
+        return float(self._factor.getMumpsRinfog(_MUMPS_OPERATIONS)) if mumps else None
 
     def destroy(self) -> None:
         """Free the factorisation and its matrix."""

@@ -16,11 +16,15 @@ DEFINITE, INDEFINITE = 2, -2
 """PARDISO's types of real matrices: symmetric positive definite, and symmetric."""
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
 """Phases of a call."""
-_SETTINGS = {1: 1, 2: 2, 10: 8, 18: -1, 19: -1, 21: 1, 24: 0}
-"""Elements of IPARM, counted from 1: no defaults, nested dissection by METIS, perturbation of tiny
-pivots by 1e-8, entries and operations to be counted, pivots of Bunch and Kaufman, and the classic
-algorithm, which was at least as fast on one thread and on two as the one in two levels."""
-_ENTRIES, _MEGAFLOP = 18, 19
+_SETTINGS = {1: 1, 2: 2, 18: -1, 19: -1, 24: 1}
+"""Elements of IPARM, counted from 1: no defaults, nested dissection by METIS, counts of entries and
+operations, and the factorisation in two levels, a tenth faster than the classic one."""
+_PIVOTING = {10: 8, 21: 1}
+"""The same of indefinite matrices: perturbation of tiny pivots by 1e-8, pivots of Bunch and
+Kaufman."""
+_ENTRIES, _MEGAFLOP, _LEVELS = 18, 19, 24
+_CLASSIC = 0
+"""Value of the element `_LEVELS` without which no operations are counted."""
 
 
 class Pardiso(DirectSolver):
@@ -56,10 +60,8 @@ class Pardiso(DirectSolver):
         self._columns = (upper.indices + 1).astype(np.int32)
         self._handle = np.zeros(64, dtype=np.int64)
         self._parameters = np.zeros(64, dtype=np.int32)
-        for number, value in _SETTINGS.items():
+        for number, value in (_SETTINGS | ({} if definite else _PIVOTING)).items():
             self._parameters[number - 1] = value
-        if definite:
-            self._parameters[9] = self._parameters[20] = 0
         self._analysed = False
 
     def analyse(self) -> None:
@@ -71,7 +73,20 @@ class Pardiso(DirectSolver):
         """Factorise; the analysis comes first."""
         self._run(_FACTORISE)
         self.entries = int(self._parameters[_ENTRIES - 1])
-        self.operations = 1e6 * float(self._parameters[_MEGAFLOP - 1])
+
+    @property
+    def operations(self) -> float:
+        """Floating-point operations of a factorisation, by an analysis of its own."""
+        kept = self._handle, self._parameters
+        self._handle, self._parameters = np.zeros_like(kept[0]), kept[1].copy()
+        self._parameters[_LEVELS - 1], self._parameters[_MEGAFLOP - 1] = _CLASSIC, -1
+        try:
+            self._run(_ANALYSE)
+            counted = 1e6 * float(self._parameters[_MEGAFLOP - 1])
+            self._run(_RELEASE)
+        finally:
+            self._handle, self._parameters = kept
+        return counted
 
     def solve(self, block: Array) -> Array:
         """Solution (n,) or column-major (n, k) for right-hand sides of that shape."""
