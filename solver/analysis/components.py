@@ -34,7 +34,7 @@ class ComponentModes:
         self._comm = comm
         self._keep = _modes_to_keep(local_mesh, options, together)
         self._subdomains = make_subdomains(local_mesh, options.interface, comm)
-        self._kept: list[KeptGroups] = []
+        self._kept: KeptGroups | None = None
 
     def synthesis(self, local_mesh: LocalMesh, threads: int, evidence: dict[str, Any]) -> Synthesis:
         """Approximate modes of the material on `local_mesh`; `evidence` gets messages and work.
@@ -43,8 +43,9 @@ class ComponentModes:
         not made again: the second shows that materials follow each other.
         """
         cutoff = self._options.cutoff
-        kept = self._kept[0] if self._kept else None
-        self._kept = self._kept or [KeptGroups()]
+        kept = self._kept
+        if kept is None:
+            self._kept = KeptGroups()
         synthesis = synthesize(
             local_mesh,
             self._keep,
