@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,6 +13,7 @@ from carillon.files.atomic import atomic_path
 from carillon.parameters.command_line import add_options
 from carillon.processes.blas import warn_about_reference_blas
 from carillon.processes.petsc import PETSc
+from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, share_cores
 from solver.linear import petsc_options
@@ -61,6 +62,24 @@ def require_outputs(arguments: argparse.Namespace, comm: MPI.Comm = MPI.COMM_SEL
 def parameters(arguments: argparse.Namespace) -> dict[str, Any]:
     """What a result was computed with, for its provenance."""
     return {key: value for key, value in vars(arguments).items() if key not in HIDDEN}
+
+
+def add_outputs(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say where a measurement goes, see `tell_measured`."""
+    parser.add_argument("--out", help="also write the result to this JSON file")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def tell_measured(
+    arguments: argparse.Namespace,
+    result: dict[str, Any],
+    as_text: Callable[[dict[str, Any]], str],
+    comm: MPI.Comm = MPI.COMM_SELF,
+) -> None:
+    """Add a measurement's `provenance` to it, write it to the file of `--out`, and print it."""
+    result["provenance"] = measured(parameters(arguments))
+    write_json(arguments, result, comm)
+    print(json.dumps(result, indent=2) if arguments.json else as_text(result))
 
 
 def write_json(

@@ -1,11 +1,9 @@
 """Rate voxels, finite cells and tetrahedra by frequencies that no mesh made, over size and time."""
 
 import argparse
-import json
 
 from carillon.parameters.command_line import add_options, collect
-from carillon.records.measurement import measured
-from solver.commands.running import on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import add_outputs, on_ranks, require_outputs, tell_measured
 from studies.accuracy.measure import AccuracyOptions, as_text, measure_accuracy
 
 EXAMPLES = """example:
@@ -16,8 +14,7 @@ EXAMPLES = """example:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser, AccuracyOptions)
-    parser.add_argument("--out", help="also write the result to this JSON file")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_outputs(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -25,6 +22,4 @@ def run(arguments: argparse.Namespace) -> None:
     with on_ranks():
         require_outputs(arguments)
         result = measure_accuracy(collect(AccuracyOptions, arguments))
-        result["provenance"] = measured(parameters(arguments))
-        write_json(arguments, result)
-    print(json.dumps(result, indent=2) if arguments.json else as_text(result))
+        tell_measured(arguments, result, as_text)

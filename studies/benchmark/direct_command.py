@@ -1,12 +1,10 @@
 """Time the factorisation of K - shift M and its solves by Carillon and by other direct solvers."""
 
 import argparse
-import json
 
 from carillon.parameters.command_line import add_options, collect
-from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import add_outputs, add_solid, on_ranks, require_outputs, tell_measured
 from studies.benchmark.direct import DirectOptions, compare, table_lines
 
 EXAMPLES = """examples:
@@ -19,8 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_solid(parser)
     add_options(parser, DirectOptions)
-    parser.add_argument("--out", help="also write the result to this JSON file")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_outputs(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -30,6 +27,4 @@ def run(arguments: argparse.Namespace) -> None:
         described = collect(ProblemOptions, arguments)
         model = build_problem(described).model
         result = compare(model, collect(DirectOptions, arguments), described.seed)
-        result["provenance"] = measured(parameters(arguments))
-        write_json(arguments, result, comm)
-    print(json.dumps(result, indent=2) if arguments.json else "\n".join(table_lines(result)))
+        tell_measured(arguments, result, lambda found: "\n".join(table_lines(found)), comm)

@@ -1,12 +1,16 @@
 """Time the steps of a design that paints one part of a solid again and again, by each method."""
 
 import argparse
-import json
 
 from carillon.parameters.command_line import add_options, collect
-from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.commands.running import add_voxels, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import (
+    add_outputs,
+    add_voxels,
+    on_ranks,
+    require_outputs,
+    tell_measured,
+)
 from studies.painted.measure import PaintedOptions, follow, lines_of
 
 EXAMPLES = """example:
@@ -18,8 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_voxels(parser)
     add_options(parser, PaintedOptions)
-    parser.add_argument("--out", help="also write the result to this JSON file")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_outputs(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -28,6 +31,4 @@ def run(arguments: argparse.Namespace) -> None:
         require_outputs(arguments, comm)
         problem = build_problem(collect(ProblemOptions, arguments))
         result = follow(problem.hexahedra, problem.young, collect(PaintedOptions, arguments))
-        result["provenance"] = measured(parameters(arguments))
-        write_json(arguments, result, comm)
-    print(json.dumps(result, indent=2) if arguments.json else "\n".join(lines_of(result)))
+        tell_measured(arguments, result, lambda found: "\n".join(lines_of(found)), comm)

@@ -1,12 +1,10 @@
 """Tell where the time to a spectrum goes, and how near each phase is to what the machine can do."""
 
 import argparse
-import json
 
 from carillon.parameters.command_line import add_options, collect
-from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions, build_problem
-from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import add_outputs, add_solid, on_ranks, require_outputs, tell_measured
 from studies.profile.measure import ProfileOptions, profile, profile_lines
 
 EXAMPLES = """example:
@@ -18,8 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_solid(parser)
     add_options(parser, ProfileOptions)
-    parser.add_argument("--out", help="also write the result to this JSON file")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_outputs(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -29,6 +26,4 @@ def run(arguments: argparse.Namespace) -> None:
         described = collect(ProblemOptions, arguments)
         model = build_problem(described).model
         result = profile(model, collect(ProfileOptions, arguments), described.seed)
-        result["provenance"] = measured(parameters(arguments))
-        write_json(arguments, result, comm)
-    print(json.dumps(result, indent=2) if arguments.json else "\n".join(profile_lines(result)))
+        tell_measured(arguments, result, lambda found: "\n".join(profile_lines(found)), comm)
