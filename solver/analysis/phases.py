@@ -17,7 +17,7 @@ from carillon.command_line.progress import say
 START = "start"
 """Phase from the start of the process until its clock is made: imports, and the start of MPI."""
 OTHER = "other"
-"""What belongs to no phase."""
+"""Name under which seconds outside of all phases are told."""
 
 ByRank = dict[str, dict[str, list[float]]]
 """By phase and figure, see `RankCost`, a number for each rank."""
@@ -25,12 +25,12 @@ ByRank = dict[str, dict[str, list[float]]]
 
 @dataclass(frozen=True)
 class RankCost:
-    """What one rank took, in a phase for example."""
+    """Time and memory of one rank in a phase, or in several together."""
 
     seconds: float = 0.0
     """Wall time until all ranks were ready."""
     processor_seconds: float = 0.0
-    """Of all threads of the process until this rank was ready."""
+    """Processor time of all threads of the process until this rank was ready."""
     waiting_seconds: float = 0.0
     """Wall time from then on, until the last rank was ready."""
     peak_memory_bytes: int = 0
@@ -46,7 +46,7 @@ class RankCost:
 
 
 class RankClock:
-    """What this rank takes in each phase of a run; a phase within another is a part of that.
+    """Time and memory of this rank by phase of a run; a phase within another is a part of that.
 
     Ranks meet at the end of each phase. A rank that waits for others within a phase takes wall time
     there, and processor time as far as its MPI polls.
@@ -91,7 +91,7 @@ class RankClock:
         self._meet(name, begin, processor)
 
     def by_rank(self) -> ByRank:
-        """What all ranks took until now, on rank 0, and nothing on the others; collective."""
+        """Time and memory of all ranks by phase, on rank 0; empty on the others; collective."""
         phases = sum(self.costs.values(), RankCost())
         other = RankCost(
             max(time.perf_counter() - self._begin - phases.seconds, 0.0),

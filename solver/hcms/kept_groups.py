@@ -19,16 +19,16 @@ from solver.hcms.merge import Group
 
 @dataclass
 class KeptGroups:
-    """What this rank made in the synthesis before, by the number of the group."""
+    """Modes and merges of this rank in the synthesis before, by the number of the group."""
 
     young: dict[int, Array] = field(default_factory=dict)
     """Moduli [Pa] of the cells that touch each subdomain of this rank."""
     bases: dict[int, Array] = field(default_factory=dict)
-    """Modes of each of them."""
+    """Modes (3 nodes, k) of each subdomain of this rank."""
     groups: dict[int, Group] = field(default_factory=dict)
     """Subdomains, and merged groups that this rank holds."""
     coefficients: dict[int, tuple[Array, Array]] = field(default_factory=dict)
-    """Coefficients of the merges that made these, split between left and right."""
+    """Coefficients of each merged group in the modes of its left and of its right child."""
     poisson: float | None = None
 
     def forget(self) -> None:

@@ -102,7 +102,7 @@ class RankTree:
         return float(total[0]), float(total[1])
 
     def bytes_of(self, dtype: Any) -> int:
-        """The same where the inside of this rank's rows is eliminated in the precision `dtype`."""
+        """Memory of a factorisation on this rank, whose own rows are eliminated in `dtype`."""
         spared = self.plan.bytes * (8 - np.dtype(dtype).itemsize) // 8
         return self.bytes - spared
 

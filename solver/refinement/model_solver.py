@@ -23,13 +23,13 @@ SolveModel = Callable[..., Modes]
 
 
 class Beginning(Protocol):
-    """What an analysis starts from, where it is given something."""
+    """Maker of the modes that an analysis starts from, if it suits the analysis."""
 
     def suits(self, solver: ModalSolver) -> bool:
-        """Whether the analysis is given something."""
+        """Whether the analysis starts from such modes."""
 
     def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial:
-        """What it starts from; collective."""
+        """Modes to start from; collective."""
 
 
 class SolveByOptions:
