@@ -21,6 +21,7 @@ SOLIDS = {
 """Solids that are measured by default."""
 Rival = Literal[
     "scipy_superlu",
+    "scipy_pardiso",
     "scipy_lobpcg",
     "primme_direct",
     "primme_multigrid",

@@ -22,6 +22,7 @@ METHODS = {
     "ddfem_ec_warm": "the same, warm",
     "arpack_regular": "ARPACK, no factorisation",
     "scipy_superlu": "SciPy's ARPACK, SuperLU",
+    "scipy_pardiso": "SciPy's ARPACK, PARDISO",
     "scipy_lobpcg": "SciPy's LOBPCG, PyAMG",
     "primme_direct": "PRIMME, factorisation",
     "primme_multigrid": "PRIMME, PyAMG",
