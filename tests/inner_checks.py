@@ -102,11 +102,18 @@ def rows_multiply_as_the_matrix_does() -> None:
 
 def multigrid_is_symmetric_positive_definite() -> None:
     system = system_of(solids.random_box(16, 9, 8))
-    matrix = system.K.copy()
-    matrix.axpy(safe_shift(system), system.M, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     rhs = solids.local_rows(system, np.random.default_rng(0).standard_normal((system.n_dofs, 12)))
     for finest in (None, system.rows.stiffness_products):
+        matrix = system.K.copy()
+        same = PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+        matrix.axpy(safe_shift(system), system.M, structure=same)
+        holder = PETSc.PC().create(COMM)
+        holder.setOperators(matrix)
+        references = matrix.getRefCount()
         grid = Multigrid(matrix, system.rigid, COMM, finest)
+        other, _ = holder.getOperators()
+        assert other.getRefCount() == references + 1  # of `other` and `_`, less the matrix's own
+        holder.destroy()
         assert len(grid.sizes) > 1 and grid.sizes[-1] == system.n_dofs
         gram = system.inner(rhs, grid.apply(rhs))
         assert np.abs(gram - gram.T).max() < 1e-12 * np.abs(gram).max()
@@ -115,7 +122,6 @@ def multigrid_is_symmetric_positive_definite() -> None:
         few = grid.apply(np.ascontiguousarray(rhs[:, :2]))
         assert np.abs(few - grid.apply(rhs)[:, :2]).max() < 1e-12 * np.abs(few).max()
         grid.destroy()
-    matrix.destroy()
 
 
 def failure_is_everyones() -> None:

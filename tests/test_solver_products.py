@@ -56,6 +56,8 @@ def test_projections_are_products_with_the_sparse_matrices(width, system):
         scale = abs(left.T) @ (abs(matrix) @ abs(right))
         assert found.shape == (13, width)
         assert (np.abs(found - left.T @ (matrix @ right)) <= ROUNDING * scale).all()
+        within = product(left, np.concatenate([right, right], axis=1)[:, width:])
+        assert (np.abs(within - found) <= 2.0 * ROUNDING * scale).all()
 
 
 @pytest.mark.parametrize("threads", [1, 2])

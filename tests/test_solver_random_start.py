@@ -189,7 +189,7 @@ def test_coarse_modes_are_a_start(method):
     solver = ModalSolver(model, options, COMM)
     start = coarse_start(solver, model, make_coarsening("galerkin"))
     coarse = blocks_from_mesh(model.mesh).coarse.n_nodes
-    assert start.vectors.shape[0] == model.n_dofs > 3 * coarse
+    assert start.vectors().shape[0] == model.n_dofs > 3 * coarse
     found = solver.solve(initial_modes=start)
     cold = ModalSolver(model, options, COMM).solve()
     np.testing.assert_allclose(found.values[6:], cold.values[6:], rtol=1e-6)

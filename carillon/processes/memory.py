@@ -13,7 +13,7 @@ LEAST_ROOM = 8 << 30
 GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
 """File with the most memory that the control group of this process may use."""
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
-_LARGEST_THRESHOLD = 1 << 30
+_LARGEST_KEPT = 1 << 28
 _NEVER = (1 << 31) - 1
 
 
@@ -53,12 +53,23 @@ def reuse_freed_memory() -> None:
     """Keep freed memory in the process instead of giving it back to the system after every use.
 
     Blocks of vectors are made and freed many times a second; mapping their pages anew takes as long
-    as a sparse product.  Only the GNU C library is told; elsewhere nothing happens.
+    as a sparse product.  Those beyond 256 MB live longer, and are given back: what is kept of them
+    others do not fit into.  Only the GNU C library is told; elsewhere nothing happens.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
-        mallopt(_M_MMAP_THRESHOLD, _LARGEST_THRESHOLD)
+        mallopt(_M_MMAP_THRESHOLD, _LARGEST_KEPT)
         mallopt(_M_TRIM_THRESHOLD, _NEVER)
+
+
+def give_back_freed_memory() -> None:
+    """Give memory that was freed, and kept for reuse, back to the system.
+
+    For the end of a phase whose blocks the next one has no use for. Only the GNU C library is told.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def spare_the_machine() -> None:

@@ -41,7 +41,11 @@ def coarse_start(
     whole = modes.system.gather(modes.vectors[:, RIGID_MODES:])
     modes.destroy()
     values = modes.values[RIGID_MODES:]
-    rows = scatter_rows(prolonged(blocks, whole), len(values), solver.local_mesh, comm)
+    mesh = solver.local_mesh
+
+    def rows() -> Array:
+        return scatter_rows(prolonged(blocks, whole), len(values), mesh, comm)
+
     return Approximation(values, rows)
 
 

@@ -44,7 +44,7 @@ class Eigenpairs:
 @dataclass
 class _Start:
     values: Array | None
-    vectors: Array | None
+    vectors: Array | Callable[[], Array] | None
     similar: Lasting | None = None
     begun: LanczosStart | None = None
 

@@ -36,9 +36,8 @@ class Halo:
         """Rows (3 g, k) of the ghosts, of a block (3 local nodes, k) that every rank passes."""
         if not self._received and not self._sent:
             return block[:0]
-        width = 3 * block.shape[1]
-        ghosts = np.empty((self._ghosts, width), dtype=block.dtype)
-        nodes = np.ascontiguousarray(block).reshape(-1, width)
+        ghosts = np.empty((self._ghosts, 3, block.shape[1]), dtype=block.dtype)
+        nodes = block.reshape(-1, 3, block.shape[1])
         requests = [
             self._comm.Irecv(ghosts[start:stop], source=rank, tag=_HALO)
             for rank, start, stop in self._received

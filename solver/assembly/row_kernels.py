@@ -33,6 +33,7 @@ def multiply(
     vectors: Array,
     ghosts: Array,
     result: Array,
+    components: int = 1,
 ) -> None:
     """Rows [start, stop) of the product of a matrix of blocks with vectors.
 
@@ -45,31 +46,43 @@ def multiply(
         `vectors` on count the ghosts.
     blocks : (e, b, b)
         Along the graph; b is 1 or 3.
-    vectors, ghosts : (b n, k), (b g, k)
-        Row-major, k at least `LANES`.
-    result : (b n, k)
+    vectors, ghosts : (c b n, k), (c b g, k)
+        Row-major, k at least `LANES`. The vectors may be columns of wider ones.
+    result : (c b n, k)
         Of which the rows are written.
+    components
+        Number c of unknowns that each number of a block multiplies; more than one if b is 1.
     """
     width, size = vectors.shape[1], blocks.shape[1]
-    flat = [sliding(each.reshape(-1)) for each in (vectors, ghosts, result)]
+    stride, own = vectors.strides[0] // vectors.itemsize, len(vectors) // (size * components)
+    near = np.lib.stride_tricks.as_strided(
+        vectors, ((len(vectors) - 1) * stride + width,), vectors.strides[1:]
+    )
+    flat = [sliding(each) for each in (near, ghosts.reshape(-1), result.reshape(-1))]
     kernel, widest = (_multiply_scalars, 2 * WIDE) if size == 1 else (_multiply_blocks, WIDE)
-    strips = _strips(width, widest)
-    kernel(rows, len(vectors) // size, *graph, blocks.reshape(-1), *flat, width, strips)
+    strips = _strips(width, stride, components, widest)
+    widths = components * stride, components * width
+    kernel(rows, own, *graph, blocks.reshape(-1), *flat, widths, strips)
 
 
 @cache
-def _strips(width: int, widest: int) -> Index:
-    """First column, and registers, of strips that cover so many columns.
+def _strips(width: int, stride: int, components: int, widest: int) -> Index:
+    """Strips that cover the columns of all components.
 
-    The last ones may go over columns once more, so that all registers are full.
+    Of each the first column in the vectors and in the result, and the number of registers. The last
+    ones may go over columns once more, so that all registers are full.
     """
-    strips, column = [], 0
-    while column < width:
-        most = min(widest, -(-(width - column) // LANES), width // LANES)
-        wide = max(each for each in STRIPS if each <= most)
-        column = min(column, width - wide * LANES)
-        strips.append((column, wide))
-        column += wide * LANES
+    if stride == width:
+        width, stride, components = components * width, components * width, 1
+    strips = []
+    for component in range(components):
+        column = 0
+        while column < width:
+            most = min(widest, -(-(width - column) // LANES), width // LANES)
+            wide = max(each for each in STRIPS if each <= most)
+            column = min(column, width - wide * LANES)
+            strips.append((component * stride + column, component * width + column, wide))
+            column += wide * LANES
     return np.array(strips)
 
 
@@ -79,8 +92,8 @@ def _strip(  # type: ignore[no-untyped-def]
 ):
     """Some rows of the result, `wide` registers of each; `size` and `wide` are literals."""
     start, stop = rows
-    column, width = place
-    near = (vectors, column, LANES, width, size * width)
+    near_column, column, near_width, width = place
+    near = (vectors, near_column, LANES, near_width, size * near_width)
     far = (ghosts, column - size * width * own, LANES, width, size * width)
     for row in range(start, stop):
         first, last = indptr[row], indptr[row + 1]
@@ -95,14 +108,14 @@ def _strip(  # type: ignore[no-untyped-def]
 
 @compiled
 def _multiply(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, size
+    rows, own, indptr, columns, blocks, vectors, ghosts, result, widths, strips, size
 ):
     literally(size)
     for first in range(rows[0], rows[1], ROWS_NEAR):
         few = (first, min(first + ROWS_NEAR, rows[1]))
         for strip in range(len(strips)):
-            place = (strips[strip, 0], width)
-            wide = strips[strip, 1]
+            place = (strips[strip, 0], strips[strip, 1], widths[0], widths[1])
+            wide = strips[strip, 2]
             if wide == 8:
                 _strip(few, own, indptr, columns, blocks, vectors, ghosts, result, place, size, 8)
             elif wide == 4:
@@ -117,13 +130,13 @@ def _multiply(  # type: ignore[no-untyped-def]
 
 @compiled
 def _multiply_blocks(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips
+    rows, own, indptr, columns, blocks, vectors, ghosts, result, widths, strips
 ):
-    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, 3)
+    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, widths, strips, 3)
 
 
 @compiled
 def _multiply_scalars(  # type: ignore[no-untyped-def]
-    rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips
+    rows, own, indptr, columns, blocks, vectors, ghosts, result, widths, strips
 ):
-    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, width, strips, 1)
+    _multiply(rows, own, indptr, columns, blocks, vectors, ghosts, result, widths, strips, 1)

@@ -48,7 +48,10 @@ class RowProducts:
         return len(self.graph[0]) - 1
 
     def times(self, block: Array) -> Array:
-        """Product (3 nodes, k) with a row-major block (3 local columns, k); collective."""
+        """Product (3 nodes, k) with a row-major block (3 local columns, k); collective.
+
+        The block may be columns of a wider one, here and below.
+        """
         width = block.shape[1]
         block, ghosts = self._with_ghosts(block)
         result = np.empty((3 * self.nodes, block.shape[1]))
@@ -104,9 +107,10 @@ class RowProducts:
             yield slice(3 * first, 3 * last), few
 
     def _with_ghosts(self, block: Array) -> tuple[Array, Array]:
-        """A contiguous block that fills a register, and the rows of others; collective."""
+        """A row-major block that fills a register, and the rows of others; collective."""
         width = block.shape[1]
-        block = np.ascontiguousarray(block)
+        if block.strides[1] != block.itemsize:
+            block = np.ascontiguousarray(block)
         if width < LANES:
             narrow, block = block, np.zeros((len(block), LANES))
             block[:, :width] = narrow
@@ -115,7 +119,5 @@ class RowProducts:
     def _multiply(self, start: int, stop: int, block: Array, ghosts: Array, result: Array) -> None:
         """Rows (3 (stop - start), k) of the product for the nodes [start, stop)."""
         indptr, columns = self.graph
-        shape = (-1, 3 // self.entries.shape[1] * block.shape[1])
-        arrays = (each.reshape(shape) for each in (block, ghosts, result))
-        rows = indptr[start : stop + 1], columns
-        multiply((0, stop - start), rows, self.entries, *arrays)
+        rows, components = (indptr[start : stop + 1], columns), 3 // self.entries.shape[1]
+        multiply((0, stop - start), rows, self.entries, block, ghosts, result, components)

@@ -6,6 +6,7 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
+from carillon.processes.memory import give_back_freed_memory
 from solver.assembly.system import System
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, default_guard
 from solver.correction.enrichment import Ritz
@@ -23,7 +24,7 @@ BLOCKS_OF_A_STEP = 3
 
 def correct(
     system: System,
-    start: Array | None,
+    start: Array | Callable[[], Array] | None,
     requested: int,
     linear: LinearSolver,
     values: Array | None = None,
@@ -52,8 +53,8 @@ def correct(
     Parameters
     ----------
     start
-        (local, q) approximate modes, q > requested for a margin; None for random vectors, which
-        only multigrid begins with.
+        (local, q) approximate modes, q > requested for a margin, or what makes them; None for
+        random vectors, which only multigrid begins with.
     values
         (q,) Ritz values of `start`, if its columns are mass-orthonormal Ritz vectors orthogonal to
         the rigid motions; otherwise a Rayleigh-Ritz step makes such of them first.
@@ -92,6 +93,7 @@ def correct(
                 f"after {result.steps} steps, {tolerance:.1e} was asked for; allow more steps"
             )
         return result
+    start = start() if callable(start) else start
     assert start is not None
     rough = values is not None and begun is None
     if values is None:
@@ -118,7 +120,7 @@ def correct(
 
 def _by_gradients(
     system: System,
-    start: Array | None,
+    start: Array | Callable[[], Array] | None,
     requested: int,
     linear: LinearSolver,
     tolerance: float,
@@ -139,15 +141,18 @@ def _by_gradients(
             )
         return _whole(values[:width], vectors[:, :width], requested)
     inverse = linear.iterative(system, -safe_shift(system))
+    precondition = inverse.precondition
+
+    def first_block() -> Array:
+        if start is None:
+            return precondition(system.times_mass(start_block(system, width, 0)))
+        return (start() if callable(start) else start)[:, :width]
+
     try:
-        precondition = inverse.precondition
         return lobpcg(
             system,
             precondition,
-            # Nothing here holds the random vectors while the iteration goes on.
-            precondition(system.times_mass(start_block(system, width, 0)))
-            if start is None
-            else start[:, :width],
+            first_block(),  # which nothing here holds while the iteration goes on
             requested,
             tolerance,
             max_steps,
@@ -155,6 +160,7 @@ def _by_gradients(
         )
     finally:
         inverse.destroy()
+        give_back_freed_memory()
 
 
 def _whole(values: Array, vectors: Array, requested: int) -> Correction:

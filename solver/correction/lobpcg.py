@@ -13,7 +13,6 @@ from carillon.errors import ConvergenceError
 from solver.assembly.system import System
 from solver.correction.result import Correction
 from solver.correction.trial_space import TrialSpace
-from solver.subspace.rayleigh_ritz import rayleigh_ritz
 
 STAGNATION, PROGRESS = 12, 0.7
 """Number of steps within which the worst error must fall, and the share of it that may be left."""
@@ -53,7 +52,7 @@ def lobpcg(
     theta_m / (theta_m - theta) times r^T K^-1 r, for which the preconditioner stands; should it be
     too small, what the last step took off the value tells.
     """
-    basis = TrialSpace(system, *rayleigh_ritz(system, start))
+    basis = TrialSpace(system, start)
     del start  # as large as the modes
     count = len(basis.values)
     if count < requested:
@@ -65,7 +64,7 @@ def lobpcg(
     history: list[float] = []
     solves = 0
     for step in range(max_steps + 1):
-        image, energy = basis.preconditioned_residuals(active, precondition)
+        energy = basis.add_residuals(active, precondition)
         solves += len(active)
         last = basis.values[-1]
         distance = np.maximum(last - basis.values[active], np.finfo(float).eps * last)
@@ -88,8 +87,8 @@ def lobpcg(
             )
         moving = errors[active] > 0.1 * tolerance
         active = active[moving]
-        basis.step(image if moving.all() else image[:, moving], active)
-    vectors = basis.vectors
+        basis.step(moving, active)
+    vectors = basis.vectors()
     return Correction(
         basis.values[:requested],
         np.ascontiguousarray(vectors[:, :requested]),

@@ -1,5 +1,6 @@
 """Modes of which little is known: block Lanczos from random vectors, or modes of a coarser mesh."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from carillon.arrays import Array
@@ -29,8 +30,8 @@ class Approximation:
 
     values: Array
     """(q,) its elastic eigenvalues [rad^2/s^2], which are about those of the fine model."""
-    vectors: Array
-    """(local, q) its modes on the fine mesh, which are far too stiff there."""
+    vectors: Callable[[], Array]
+    """Makes its modes (local, q) on the fine mesh, which are far too stiff there; collective."""
     inverse: Inverse | None = None
     """Inverse of the fine model's K - mu M, used if mu lies amid the wanted eigenvalues; the
     iteration owns it then."""
@@ -91,7 +92,7 @@ def from_nothing(
         given = None
         if near is not None:
             start, look = mixed(
-                system, near.values, near.vectors, requested, inverse.shift, tolerance, columns
+                system, near.values, near.vectors(), requested, inverse.shift, tolerance, columns
             )
         result = lanczos(system, inverse, start, accurate, width, tolerance, look, seed + 1)
         if result.too_high and attempt < ATTEMPTS - 1:

@@ -8,13 +8,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import ConvergenceError
 from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.subspace.orthonormal import orthonormal
-from solver.subspace.rayleigh_ritz import reduced_eigenpairs
+from solver.subspace.rayleigh_ritz import reduced_eigenpairs, ritz_weights
 
 ROWS_AT_ONCE = 2048
 """Number of rows of the basis that are multiplied together and written back."""
@@ -23,60 +23,81 @@ COLUMNS_AT_ONCE = 16
 
 
 class TrialSpace:
-    """Span of the modes X, the directions P and the preconditioned residuals W.
+    """Span of the modes X, the directions P and the preconditioned residuals W, in one block.
 
-    Parameters
-    ----------
-    values
-        (m,) Ritz values of X [rad^2/s^2].
-    vectors
-        (local, m) X, mass-orthonormal and free of rigid motions.
+    X are the Ritz vectors of a start (local, m); of a start with rigid or dependent columns there
+    are fewer than m.
     """
 
-    def __init__(self, system: System, values: Array, vectors: Array) -> None:
+    def __init__(self, system: System, start: Array) -> None:
         self._system = system
-        self._width = self._used = len(values)
-        self.values = values
-        self._block = np.empty((len(vectors), 3 * self._width))
-        self._block[:, : self._width] = vectors
+        count = start.shape[1]
+        self._block = np.empty((len(start), 3 * count))
+        self._block[:, :count] = start
+        self._width = self._used = count
+        self.values = self._ritz_values()
+        """Ritz values (m,) of X [rad^2/s^2]."""
         # X and P projected on K, and their Gram matrix.
-        self._stiff, self._gram = np.diag(values), np.eye(self._width)
+        self._stiff, self._gram = np.diag(self.values), np.eye(self._width)
 
-    @property
+    def _ritz_values(self) -> Array:
+        """Make X mass-orthonormal Ritz vectors that are free of rigid motions, in place."""
+        vectors = self._block[:, : self._width]
+        values, weights = ritz_weights(self._system, vectors)
+
+        def rotated(here: slice) -> None:
+            vectors[here, : len(values)] = vectors[here] @ weights
+
+        self._by_rows(rotated)
+        self._width = self._used = len(values)
+        return values
+
     def vectors(self) -> Array:
-        """X (local, m)."""
-        return np.ascontiguousarray(self._block[:, : self._width])
+        """X (local, m), for which the space is given up: its block shrinks to these columns."""
+        block, width = self._block, self._width
+        rows = len(block)
+        flat = block.reshape(-1)
+        for first in range(0, rows, ROWS_AT_ONCE):
+            few = block[first : first + ROWS_AT_ONCE, :width].copy()
+            flat[first * width : first * width + few.size] = few.reshape(-1)
+        del flat, self._block
+        block.resize((rows * width,), refcheck=False)
+        return block.reshape(rows, width)
 
-    def preconditioned_residuals(
-        self, numbers: Index, precondition: Callable[[Array], Array]
-    ) -> tuple[Array, Array]:
-        """W (local, k) = `precondition`(R) for the residuals R = K X - M X Theta of some vectors.
+    def add_residuals(self, numbers: Index, precondition: Callable[[Array], Array]) -> Array:
+        """Make W = `precondition`(R) of the residuals R = K X - M X Theta of some vectors (k,).
 
-        Also returns the products (k,) of each residual with its column of W.
+        Returns the products (k,) of each residual with its column of W.
         """
-        image = np.empty((len(self._block), len(numbers)))
+        system, block = self._system, self._block
         energy = np.empty(len(numbers))
         for first in range(0, len(numbers), COLUMNS_AT_ONCE):
             few = numbers[first : first + COLUMNS_AT_ONCE]
-            chosen = slice(first, first + len(few))
-            vectors = np.ascontiguousarray(self._block[:, few])
-            residual = self._system.times_mass(vectors)
+            vectors = _columns(block, few)
+            residual = system.times_mass(vectors)
             residual *= -self.values[few]
-            residual += self._system.times_stiffness(vectors)
+            residual += system.times_stiffness(vectors)
             del vectors
             found = precondition(residual)
-            energy[chosen] = self._system.column_products(residual, found)
-            image[:, chosen] = found
-        return image, energy
+            energy[first : first + len(few)] = system.column_products(residual, found)
+            place = self._used + first
+            block[:, place : place + len(few)] = found
+        return energy
 
-    def step(self, image: Array, numbers: Index) -> None:
-        """Replace X by the lowest Ritz vectors of the span of X, P and `image` (local, w).
+    def step(self, moving: Flags, numbers: Index) -> None:
+        """Replace X by the lowest Ritz vectors of the span of X, P and some columns of W.
 
-        `numbers` (w,) are the vectors whose directions are kept for the next step. Raises
-        ConvergenceError if the span has fewer than m independent vectors.
+        Raises ConvergenceError if the span has fewer than m independent vectors.
+
+        Parameters
+        ----------
+        moving
+            Which columns of W (k,) are used.
+        numbers
+            The vectors (w,) that they belong to, whose directions become P.
         """
         system, width = self._system, self._width
-        gram, stiff = self._append(image)
+        gram, stiff = self._with_residuals(moving)
         whole = len(gram)
         # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
         values, weights = bcast_from_root(system.comm, lambda: reduced_eigenpairs(stiff, gram))
@@ -94,32 +115,39 @@ class TrialSpace:
         self.values = values[:width]
         self._used = both.shape[1]
 
-    def _append(self, image: Array) -> tuple[Array, Array]:
-        """Put an orthonormal basis of what is in `image` beside rigid motions and X after X and P.
+    def _with_residuals(self, moving: Flags) -> tuple[Array, Array]:
+        """Make the `moving` columns of W orthonormal, beside rigid motions and X, in place.
 
-        Returns the Gram matrix and the projected stiffness of all three. The image is overwritten.
+        Returns the Gram matrix and the projected stiffness of X, P and W.
         """
         system, used, block = self._system, self._used, self._block
-        vectors = block[:, : self._width]
-        shares = system.inner(system.mass_rigid, image), system.project_mass(vectors, image)
+        count = np.count_nonzero(moving)
+        vectors, added = block[:, : self._width], block[:, used : used + count]
+        if count < len(moving):
+            columns = used + np.flatnonzero(moving)
+
+            def drawn_together(here: slice) -> None:
+                added[here] = block[here, columns]
+
+            self._by_rows(drawn_together)
+        shares = system.inner(system.mass_rigid, added), system.project_mass(vectors, added)
 
         def swept(here: slice) -> None:
-            image[here] -= system.rigid[here] @ shares[0]
-            image[here] -= vectors[here] @ shares[1]
+            added[here] -= system.rigid[here] @ shares[0]
+            added[here] -= vectors[here] @ shares[1]
 
         self._by_rows(swept)
-        gram = system.project_mass(image, image)
+        gram = system.project_mass(added, added)
         weights, _ = bcast_from_root(system.comm, lambda: orthonormal(gram))
-        whole = used + weights.shape[1]
+        basis = block[:, : used + weights.shape[1]]
 
         def combined(here: slice) -> None:
-            block[here, used:whole] = image[here] @ weights
+            basis[here, used:] = added[here] @ weights
 
         self._by_rows(combined)
-        basis, added = block[:, :whole], np.ascontiguousarray(block[:, used:whole])
         return (
-            _bordered(self._gram, system.project_mass(basis, added)),
-            _bordered(self._stiff, system.project_stiffness(basis, added)),
+            _bordered(self._gram, system.project_mass(basis, basis[:, used:])),
+            _bordered(self._stiff, system.project_stiffness(basis, basis[:, used:])),
         )
 
     def _rotate(self, weights: Array, numbers: Index, whole: int) -> None:
@@ -144,6 +172,13 @@ class TrialSpace:
                 work(slice(first, min(first + ROWS_AT_ONCE, stop)))
 
         in_parallel(part, split(rows, threads, max(rows, 1)), threads)
+
+
+def _columns(block: Array, numbers: Index) -> Array:
+    """Columns of a block, which are copied unless they follow each other."""
+    if numbers[-1] - numbers[0] == len(numbers) - 1:
+        return block[:, numbers[0] : numbers[-1] + 1]
+    return block[:, numbers]
 
 
 def _bordered(known: Array, columns: Array) -> Array:

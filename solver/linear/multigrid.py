@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.numerics.simd_width import LANES
+from carillon.processes.memory import give_back_freed_memory
 from carillon.processes.petsc import PETSc
 from solver.assembly.row_products import RowProducts
 from solver.linear.block_rows import block_rows, diagonal
@@ -40,7 +41,7 @@ class Multigrid:
     Parameters
     ----------
     matrix
-        Symmetric positive definite PETSc matrix (AIJ, block size 3).
+        Symmetric positive definite PETSc matrix (AIJ, block size 3), which is freed.
     near_null
         (local, 6) rigid motions: what smoothing cannot reduce, and coarse levels must represent.
     finest
@@ -57,19 +58,22 @@ class Multigrid:
         threads: int = 1,
     ) -> None:
         pc = _aggregate(matrix, near_null, comm)
-        count = pc.getMGLevels()
+        numbers = range(pc.getMGLevels())
+        matrices = [pc.getMGSmoother(number).getOperators()[0] for number in numbers]
+        interpolations = [pc.getMGInterpolation(number) for number in numbers[1:]]
+        self.sizes = [each.getSize()[0] for each in matrices]
+        self._coarsest = _Inverse(matrices[0], comm)
+        rows = [block_rows(each, comm, threads) for each in matrices[1:-1]]
+        rows.append(block_rows(matrix, comm, threads) if finest is None else finest)
+        # petsc4py keeps for later what its garbage collector is the last to let go; of the coarse
+        # matrices each holds the finer one.
+        for each in (*matrices, pc, matrix):
+            each.destroy()
+        give_back_freed_memory()
         self._levels = []
-        for number in range(count - 1, 0, -1):
-            of_level, _ = pc.getMGSmoother(number).getOperators()
-            rows = finest if finest is not None and number == count - 1 else None
-            rows = block_rows(of_level, comm, threads) if rows is None else rows
-            self._levels.append(_Level.of(rows, pc.getMGInterpolation(number), comm))
-        coarsest, _ = pc.getMGSmoother(0).getOperators()
-        self._coarsest = _Inverse(coarsest, comm)
-        self.sizes = [
-            pc.getMGSmoother(number).getOperators()[0].getSize()[0] for number in range(count)
-        ]
-        pc.destroy()
+        for of_level, interpolation in zip(rows[::-1], interpolations[::-1], strict=True):
+            self._levels.append(_Level.of(of_level, interpolation, comm))
+            interpolation.destroy()
 
     def apply(self, block: Array) -> Array:
         """One V-cycle from zero for a block of right-hand sides (local, k); collective."""
@@ -198,7 +202,7 @@ def _aggregate(matrix: Any, near_null: Array, comm: MPI.Comm) -> Any:
     everywhere = PETSc.Options()
     if comm.size > 1:
         # By default PETSc adds other ranks' parts of a coarse matrix in the order they arrive in.
-        everywhere["matptap_via"] = "allatonce"
+        everywhere["matptap_via"] = "backend"
     pc = PETSc.PC().create(comm)
     pc.setOptionsPrefix(MULTIGRID_PREFIX)
     pc.setOperators(matrix)

@@ -164,8 +164,12 @@ class FineStart:
         requested = solver.options.modes - RIGID_MODES
         if solver.options.method not in RANDOM or solver.options.check_inertia:
             return None
-        columns = prolonged(self.blocks, self.modes)
-        rows = scatter_rows(columns, len(self.values), solver.local_mesh, solver.comm)
+        mesh = solver.local_mesh
+
+        def rows() -> Array:
+            columns = prolonged(self.blocks, self.modes)
+            return scatter_rows(columns, len(self.values), mesh, solver.comm)
+
         inverse = self.solid.inverse
         if solver.local_mesh is not self.prepared.local_mesh or inverse is None:
             inverse = None

@@ -24,6 +24,8 @@ POLYNOMIAL_DEGREE = 3
 HINGE_TOLERANCE = 1e-13
 """Estimate, as a fraction of the stiffest polynomial field's, below which it is zero to
 rounding."""
+ROWS_AT_ONCE = 4096
+"""Number of rows of a block that lose their rigid motions together."""
 SHIFT_FRACTION = 0.1
 """Shift of the singular stiffness, as a fraction of the first elastic eigenvalue's estimate."""
 
@@ -37,6 +39,28 @@ def rayleigh_ritz(system: System, block: Array, count: int | None = None) -> tup
     values, weights = ritz_pairs(system, block, system.times_stiffness(block), mass_block)
     count = len(values) if count is None else min(count, len(values))
     return values[:count], block @ weights[:, :count]
+
+
+def ritz_weights(system: System, block: Array) -> tuple[Array, Array]:
+    """Ritz values (k,) of the span of `block` (local, m), and their weights (m, k) in its vectors.
+
+    The vectors lose their rigid motions, in place. No product with K or M of all of them is kept:
+    this is for blocks that fill the memory, and may be columns of a wider one.
+    """
+    before = np.diag(system.project_mass(block, block))
+    shares = system.inner(system.mass_rigid, block)
+    for first in range(0, len(block), ROWS_AT_ONCE):
+        here = slice(first, first + ROWS_AT_ONCE)
+        block[here] -= system.rigid[here] @ shares
+    gram = system.project_mass(block, block)
+    elastic = np.flatnonzero(np.diag(gram) > RIGID_TOLERANCE**2 * before)
+    chosen = np.ix_(elastic, elastic)
+    stiff, gram = system.project_stiffness(block, block)[chosen], gram[chosen]
+    # Solved once: two processors may round apart, and an eigenvector's sign hangs on rounding.
+    values, of_elastic = bcast_from_root(system.comm, lambda: reduced_eigenpairs(stiff, gram))
+    weights = np.zeros((block.shape[1], len(values)))
+    weights[elastic] = of_elastic
+    return values, weights
 
 
 def ritz_pairs(
@@ -127,7 +151,7 @@ def first_elastic_estimate(system: System) -> float:
     powers = [power for power in powers if sum(power) <= POLYNOMIAL_DEGREE]
     fields = np.stack([(system.coordinates**power).prod(axis=1) for power in powers], axis=1)
     block = np.einsum("np,ij->nipj", fields, np.eye(3)).reshape(3 * len(fields), -1)
-    values, _ = rayleigh_ritz(system, np.ascontiguousarray(block))
+    values, _ = ritz_weights(system, np.ascontiguousarray(block))
     if values[0] <= HINGE_TOLERANCE * values[-1]:
         raise ConvergenceError(
             "a seventh zero-frequency mode found, a connected free body has six; part of the model "
