@@ -148,6 +148,7 @@ def _by_gradients(
             return precondition(system.times_mass(start_block(system, width, 0)))
         return (start() if callable(start) else start)[:, :width]
 
+    give_back_freed_memory()  # of setting up multigrid, as much as the blocks to come
     try:
         return lobpcg(
             system,
