@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from carillon.errors import ConvergenceError
-from carillon.fem import aggregation, laplacian
-from carillon.fem.aggregation import ShiftedInverse, levels_of
-from carillon.fem.geometry import hexmesh_from_grid
+from carillon.fem import cell_rows, laplacian, multigrid
+from carillon.fem.aggregation import levels_of
+from carillon.fem.cell_rows import CellRows
+from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_grid
 from carillon.fem.laplacian import cell_laplacian, laplacian_modes, rough_modes
+from carillon.fem.multigrid import ShiftedInverse
 from carillon.processes.threads import one_thread
 from solver.distribution import partition
 from tests import solids
@@ -46,7 +49,7 @@ def test_every_run_has_the_same_eigenvectors(few_cells):
 
 
 def test_iterations_do_not_grow_with_the_mesh(monkeypatch):
-    monkeypatch.setattr(aggregation, "MOST_ITERATIONS", 30)
+    monkeypatch.setattr(multigrid, "MOST_ITERATIONS", 30)
     for cells in (8, 16, 32):
         mesh = solids.box_mesh(cells, cells, cells)
         matrix = cell_laplacian(mesh)
@@ -56,8 +59,39 @@ def test_iterations_do_not_grow_with_the_mesh(monkeypatch):
         assert np.linalg.norm(residual) < 1e-7 * np.linalg.norm(rhs)
 
 
+@pytest.mark.parametrize("shortest", [1, 4, 1000])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_products_add_up_in_the_order_of_the_columns(mixed, shortest, monkeypatch):
+    monkeypatch.setattr(cell_rows, "SHORTEST", shortest)
+    mesh = bracket()
+    if mixed:  # where cells have up to 24 neighbours
+        refined = np.random.default_rng(0).random(blocks_from_mesh(mesh).coarse.n_cells) < 0.5
+        mesh = blocks_from_mesh(mesh, refined).coarse
+    matrix = (cell_laplacian(mesh) + 0.1 * sp.identity(mesh.n_cells)).tocsr()
+    rough = matrix.astype(np.float32)
+    rows = CellRows(matrix)
+    vector, rhs = np.random.default_rng(1).standard_normal((2, mesh.n_cells))
+    product = np.empty(mesh.n_cells)
+    rows.multiply(rows.padded(vector), product)
+    assert np.array_equal(product, matrix @ vector)
+    vector, rhs = vector.astype(np.float32), rhs.astype(np.float32)
+    expected, scale = rhs - rough @ vector, np.float32(0.7) / rough.diagonal()
+    residual, smoothed = np.empty_like(rhs), rows.padded(np.zeros_like(rhs))
+    rows.subtract(rows.padded(vector), rhs, residual)
+    assert np.array_equal(residual, expected)
+    rows.smooth(rows.padded(vector), rhs, scale, smoothed)
+    assert np.array_equal(smoothed, rows.padded(vector + scale * expected))
+
+
+def test_cells_without_neighbours_have_rows():
+    rows = CellRows(sp.csr_matrix(np.diag([2.0, 3.0])))
+    product = np.empty(2)
+    rows.multiply(rows.padded(np.array([1.0, -1.0])), product)
+    assert product.tolist() == [2.0, -3.0]
+
+
 def test_a_missed_tolerance_is_an_error(monkeypatch):
-    monkeypatch.setattr(aggregation, "MOST_ITERATIONS", 1)
+    monkeypatch.setattr(multigrid, "MOST_ITERATIONS", 1)
     mesh = bracket()
     inverse = ShiftedInverse(levels_of(cell_laplacian(mesh), mesh.grid, 20), 1e-3, 1e-8)
     with pytest.raises(ConvergenceError, match="Laplacian of .* cells missed"):

@@ -14,8 +14,9 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from carillon.arrays import Array
-from carillon.fem.aggregation import COARSEST, Level, ShiftedInverse, levels_of
+from carillon.fem.aggregation import COARSEST, Level, levels_of
 from carillon.fem.geometry.faces import face_neighbours
+from carillon.fem.multigrid import ShiftedInverse
 from carillon.processes.threads import blas_threads
 
 if TYPE_CHECKING:
