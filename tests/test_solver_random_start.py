@@ -10,6 +10,7 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry import blocks_from_mesh, builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, fine_model
+from solver.analysis import corrected
 from solver.analysis.coarse_start import coarse_start
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
@@ -166,6 +167,21 @@ def test_what_no_memory_holds_is_left_to_multigrid(box, monkeypatch):
     found = solids.analysed(box.model, modes=26, tolerance=1e-4)
     assert (found.evidence["method"], found.evidence["linear_solver"]) == ("lobpcg", "amg-cg")
     assert np.abs(found.values[RIGID_MODES:] / box.exact[:20] - 1.0).max() <= 1e-4
+
+
+@pytest.mark.parametrize("method", ["lobpcg", "hcms"])
+def test_a_count_that_no_memory_holds_is_refused_before_modes_are_sought(box, monkeypatch, method):
+    def never(*_, **__):
+        raise AssertionError("modes are sought")
+
+    monkeypatch.setattr(corrected, "correct", never)
+    monkeypatch.setattr(rank_tree, "available_memory", lambda: 1000)
+    options = {"modes": 26, "tolerance": 1e-4, "method": method, "check_inertia": True}
+    with pytest.raises(UserError, match="count of eigenvalues takes about .* leave out"):
+        solids.analysed(box.model, **options)
+    monkeypatch.setattr(rank_tree, "available_memory", lambda: None)
+    with pytest.raises(AssertionError, match="modes are sought"):
+        solids.analysed(box.model, **options)
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,8 @@ def reuse_freed_memory() -> None:
 def give_back_freed_memory() -> None:
     """Give memory that was freed, and kept for reuse, back to the system.
 
-    For the end of a phase whose blocks the next one has no use for. Only the GNU C library is told.
+    For the end of a phase whose blocks the next one has no use for, and before something asks how
+    much is free. Only the GNU C library is told.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:

@@ -95,6 +95,8 @@ class CorrectedModes:
         requested = options.modes - RIGID_MODES
         if options.check_inertia:
             requested = min(requested + SPARE_MODES, local_mesh.n_dofs - RIGID_MODES)
+            # Said now, rather than once the modes are there, and lost.
+            self._linear.tree.require_count(8 * requested * len(system.rigid))
         near = initial if isinstance(initial, Approximation) else None
         if (initial is None and options.method == "lanczos") or (near and self._together):
             with phases("lanczos"):

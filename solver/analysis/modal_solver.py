@@ -114,7 +114,7 @@ class ModalSolver:
     def _correct_by(self, method: str, options: SolverOptions) -> None:
         """Correct modes by a method, which `lobpcg` does without a factorisation."""
         self.options = replace(options, method=method)
-        linear = LinearSolver("amg-cg", self._layout) if self._is_by_choice else self._linear
+        linear = self._linear.by("amg-cg") if self._is_by_choice else self._linear
         report = _reporter(self._verbose and self.comm.rank == 0)
         self._corrected = CorrectedModes(
             self.options, self.local_mesh, linear, self.comm, self._threads, report

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -131,6 +132,12 @@ class LinearSolver:
         if method == "multifrontal":
             # What depends on the mesh alone.
             self.tree  # noqa: B018
+
+    def by(self, method: str) -> LinearSolver:
+        """Solver by another method, which shares what was computed of the mesh."""
+        other = copy(self)
+        other.method = method
+        return other
 
     @cached_property
     def tree(self) -> RankTree:

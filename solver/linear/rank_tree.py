@@ -14,9 +14,9 @@ import numpy as np
 from mpi4py import MPI
 
 from carillon.arrays import Array, Index
-from carillon.errors import ConvergenceError
+from carillon.errors import ConvergenceError, UserError
 from carillon.fem.block import degrees_of_freedom
-from carillon.processes.memory import available_memory
+from carillon.processes.memory import available_memory, give_back_freed_memory
 from solver.distribution.collective import on_every_rank, sum_over_machine
 from solver.distribution.rank_groups import communicator
 from solver.linear.elimination import eliminate_fronts
@@ -115,11 +115,36 @@ class RankTree:
         fits = available is None or needed < share * available
         return bool(self.comm.allreduce(fits, MPI.LAND))
 
+    @property
+    def bytes_of_count(self) -> int:
+        """Memory that `count_below` takes on this rank."""
+        return self.bytes - self.plan.bytes + self.plan.bytes_of_updates
+
+    def require_count(self, beside: int) -> None:
+        """Raise UserError on every rank if `count_below` will not fit into the memory; collective.
+
+        This rank will hold so many more bytes `beside` it than now.
+        """
+        give_back_freed_memory()
+        needed = sum_over_machine(self.comm, self.bytes_of_count + beside)
+
+        def check() -> None:
+            free = available_memory()
+            if free is not None and needed > free:
+                raise UserError(
+                    f"the count of eigenvalues takes about {needed / 1e9:,.1f} GB with the modes, "
+                    f"{free / 1e9:,.1f} GB are free; leave out --check-inertia, or use more ranks "
+                    "on more machines"
+                )
+
+        on_every_rank(self.comm, check)
+
     def _require_memory(self, own: int) -> None:
         """Refuse on every rank what takes more memory than one of the machines has.
 
         Each rank passes what it needs of its machine's.
         """
+        give_back_freed_memory()
         needed = sum_over_machine(self.comm, own)
         on_every_rank(self.comm, lambda: require_memory(self._unknowns, needed))
 
@@ -148,7 +173,7 @@ class RankTree:
         """
         plan, rows = self.plan, system.rows
         matrices = rows.stiffness, rows.mass
-        self._require_memory(self.bytes - plan.bytes + plan.bytes_of_updates)
+        self._require_memory(self.bytes_of_count)
         negative, rest = on_every_rank(
             self.comm, lambda: eliminate_fronts(plan, *matrices, value, rows.threads, None)
         )
