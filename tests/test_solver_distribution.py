@@ -19,6 +19,8 @@ EVERYWHERE = [
 SOME = [
     "arrays_arrive_as_they_were",
     "messages_counted_are_messages_sent",
+    "ranks_send_each_other_a_message_up_and_one_down_for_a_merge",
+    "exchanges_leave_the_modes_as_they_are",
     "groups_that_do_not_touch_can_be_merged",
 ]
 FEW = [

@@ -66,21 +66,38 @@ def test_merges_at_one_level_are_on_different_ranks():
         assert len(teams) == 1 << (6 - level)
 
 
-def test_an_idle_rank_takes_merges_of_a_busy_one():
-    # Three quarters of the merges are on the first rank, which has as much of the subdomains.
-    tree, owner, nodes, found = plan(4, 2, 300, [200.0] * 12 + [1600.0] * 4)
-    moved = [
+def made_elsewhere(tree: MergeTree, found: Schedule) -> list[Merge]:
+    """Merges of groups of one rank that another makes."""
+    return [
         step
         for step in tree.merges
         if found.holder[step.left] == found.holder[step.right] != found.holder[step.group]
     ]
-    assert moved
+
+
+def test_an_idle_rank_takes_merges_of_a_busy_one_if_they_are_large():
+    # Three quarters of the merges are on the first rank, which has as much of the subdomains.
+    uneven = [200.0] * 12 + [1600.0] * 4
+    tree, owner, nodes, found = plan(4, 2, 1200, uneven)
+    assert made_elsewhere(tree, found)
     stay = Schedule(
         (*map(int, owner), *(int(owner[start]) for start, _ in tree.ranges()[tree.parts :])),
         tuple((int(owner[start]),) for start, _ in tree.ranges()[tree.parts :]),
         found.crews,
+        found.exchanges,
     )
-    assert busiest(tree, nodes, found, 300, 2) < busiest(tree, nodes, stay, 300, 2)
+    assert busiest(tree, nodes, found, 1200, 2) < busiest(tree, nodes, stay, 1200, 2)
+    tree, _, _, found = plan(4, 2, 100, uneven)
+    assert not made_elsewhere(tree, found)
+
+
+@pytest.mark.parametrize("keep", [60, 600, 2400])
+@pytest.mark.parametrize("ranks", [2, 4, 8, 16])
+def test_a_rank_that_has_as_much_to_do_as_the_others_makes_its_own_merges(ranks, keep):
+    tree, owner, _, found = plan(5, ranks, keep)
+    assert not made_elsewhere(tree, found)
+    across = [step for step in tree.merges if found.holder[step.left] != found.holder[step.right]]
+    assert len(across) == ranks - 1
 
 
 def test_large_merges_are_shared_and_small_ones_are_not(monkeypatch):

@@ -1,18 +1,20 @@
 """What rank 0 computes for all ranks, errors included, and arrays that ranks send each other.
 
-Arrays travel as contiguous buffers, announced by one short message with their shapes.
+Arrays travel together in one message, which begins with their shapes: links between machines take
+their time for every message.
 """
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
 from carillon.command_line.exit_status import meaning
 from carillon.command_line.progress import say
 from carillon.errors import one_line
@@ -23,9 +25,9 @@ T = TypeVar("T")
 
 AnyArray = NDArray[Any]
 
-MOST_ARRAYS = 10
-"""Largest number of arrays in one announcement."""
 MOST_DIMENSIONS = 3
+WORD = 8
+"""Bytes of what messages of arrays are counted in; each array begins with a new one."""
 
 _TYPES = tuple(np.dtype(name) for name in ("f8", "i8", "i4", "u1"))
 _FIELDS = 2 + MOST_DIMENSIONS
@@ -152,61 +154,59 @@ def _attempt(comm: MPI.Comm, compute: Callable[[], T]) -> tuple[T | None, Except
         return None, error
 
 
-@dataclass
 class Sent:
-    """Messages under way.
+    """A message under way, and the number of its `bytes`; its buffer lives until `wait`."""
 
-    `messages` and `bytes` are their numbers, announcement included.
-    """
-
-    messages: int = 0
-    bytes: int = 0
-    _requests: list[MPI.Request] = field(default_factory=list)
-    _buffers: list[AnyArray] = field(default_factory=list)
-
-    def post(self, comm: MPI.Comm, array: AnyArray, rank: int, tag: int) -> None:
-        """Start to send one contiguous array; it is kept alive until `wait`."""
-        self._requests.append(comm.Isend(array, dest=rank, tag=tag))
-        self._buffers.append(array)
-        self.messages += 1
-        self.bytes += array.nbytes
+    def __init__(self, request: MPI.Request, buffer: AnyArray) -> None:
+        self.bytes = buffer.nbytes
+        self._request = request
+        self._buffer: AnyArray | None = buffer
 
     def wait(self) -> None:
-        """Return when every message has left its buffer."""
-        MPI.Request.Waitall(self._requests)
-        self._requests.clear()
-        self._buffers.clear()
+        """Return when the message has left its buffer."""
+        self._request.Wait()
+        self._buffer = None
 
 
 def send_arrays(comm: MPI.Comm, arrays: Sequence[AnyArray], rank: int, tag: int) -> Sent:
-    """Start to send `arrays` to `rank`, for `receive_arrays`; empty ones need no message.
-
-    Arrays that are contiguous are not copied and must not be changed before `Sent.wait`.
-    """
-    if len(arrays) > MOST_ARRAYS:
-        raise ValueError(f"{len(arrays)} arrays in one message, expected at most {MOST_ARRAYS}")
-    header = np.zeros((MOST_ARRAYS + 1, _FIELDS), dtype=np.int64)
-    header[0, 0] = len(arrays)
-    for entry, array in zip(header[1:], arrays):
+    """Start to send `arrays` to `rank` in one message, for `receive_arrays`; they are copied."""
+    header = np.zeros(1 + _FIELDS * len(arrays), dtype=np.int64)
+    header[0] = len(arrays)
+    for entry, array in zip(header[1:].reshape(-1, _FIELDS), arrays, strict=True):
         entry[0] = _TYPES.index(array.dtype)
         entry[1] = array.ndim
         entry[2 : 2 + array.ndim] = array.shape
-    sent = Sent()
-    sent.post(comm, header, rank, tag)
+    buffer = np.empty(len(header) + sum(_words(array.nbytes) for array in arrays))
+    buffer[: len(header)] = header.view(np.float64)
+    place = len(header)
     for array in arrays:
-        if array.size:
-            sent.post(comm, np.ascontiguousarray(array), rank, tag)
-    return sent
+        words = _words(array.nbytes)
+        _as_array(buffer[place : place + words], array.dtype, array.shape)[...] = array
+        place += words
+    return Sent(comm.Isend(buffer, dest=rank, tag=tag), buffer)
 
 
 def receive_arrays(comm: MPI.Comm, rank: int, tag: int) -> list[AnyArray]:
-    """Arrays that `rank` sent by `send_arrays`, in row-major order."""
-    header = np.empty((MOST_ARRAYS + 1, _FIELDS), dtype=np.int64)
-    comm.Recv(header, source=rank, tag=tag)
+    """Arrays that `rank` sent by `send_arrays`, in row-major order; they share one buffer."""
+    status = MPI.Status()
+    message = comm.Mprobe(source=rank, tag=tag, status=status)
+    buffer = np.empty(status.Get_count(MPI.DOUBLE))
+    message.Recv(buffer)
+    place = 1 + _FIELDS * int(buffer[:1].view(np.int64)[0])
     arrays = []
-    for code, dimensions, *shape in header[1 : 1 + header[0, 0]].tolist():
-        array = np.empty(shape[:dimensions], dtype=_TYPES[code])
-        if array.size:
-            comm.Recv(array, source=rank, tag=tag)
-        arrays.append(array)
+    for code, dimensions, *sides in buffer[1:place].view(np.int64).reshape(-1, _FIELDS).tolist():
+        shape, dtype = tuple(sides[:dimensions]), _TYPES[code]
+        words = _words(math.prod(shape) * dtype.itemsize)
+        arrays.append(_as_array(buffer[place : place + words], dtype, shape))
+        place += words
     return arrays
+
+
+def _words(size: int) -> int:
+    """Words that so many bytes take."""
+    return -(-size // WORD)
+
+
+def _as_array(words: Array, dtype: np.dtype[Any], shape: tuple[int, ...]) -> AnyArray:
+    """An array in the first bytes of some words."""
+    return words.view(np.uint8)[: math.prod(shape) * dtype.itemsize].view(dtype).reshape(shape)

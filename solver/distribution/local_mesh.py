@@ -144,9 +144,13 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
     everyone = comm.gather(local_mesh.numbers)
     if comm.rank == 0:
         assert young is not None and everyone is not None
-        for rank in range(1, comm.size):
-            send_arrays(comm, [young[everyone[rank]]], rank, _MODULI).wait()
+        sent = [
+            send_arrays(comm, [young[everyone[rank]]], rank, _MODULI)
+            for rank in range(1, comm.size)
+        ]
         mine = young[local_mesh.numbers]
+        for message in sent:
+            message.wait()
     else:
         (mine,) = receive_arrays(comm, 0, _MODULI)
     cells = replace(local_mesh.cells, elements=local_mesh.cells.elements.with_young(mine))
@@ -177,10 +181,14 @@ def _scatter(
         numbers = cell[first[rank] : first[rank + 1]].copy()
         return nodes, model.mesh.nodes[nodes], numbers, whole.take(numbers)
 
+    sent = []
     for rank in range(1, comm.size):
         *arrays, cells = part(rank)
-        send_arrays(comm, [*arrays, *cells.arrays()], rank, _LOCAL_MESH).wait()
-    return part(0)
+        sent.append(send_arrays(comm, [*arrays, *cells.arrays()], rank, _LOCAL_MESH))
+    own = part(0)
+    for message in sent:
+        message.wait()
+    return own
 
 
 def _incidences(corner_owner: NDArray[np.integer]) -> tuple[Index, Index]:

@@ -87,9 +87,12 @@ def scatter_rows(
         assert everyone is not None
         dofs = [degrees_of_freedom(nodes) for nodes in everyone]
         for block in blocks:
-            for rank in range(1, comm.size):
-                send_arrays(comm, [block[dofs[rank]]], rank, _ROWS).wait()
+            sent = [
+                send_arrays(comm, [block[dofs[rank]]], rank, _ROWS) for rank in range(1, comm.size)
+            ]
             rows[:, first : first + block.shape[1]] = block[dofs[0]]
+            for message in sent:
+                message.wait()
             first += block.shape[1]
         return rows
     while first < count:

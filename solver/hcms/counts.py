@@ -12,7 +12,6 @@ from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from solver.distribution.collective import Sent
@@ -30,7 +29,7 @@ class Tally:
 
     messages: float = 0.0
     bytes: float = 0.0
-    """Messages sent by this rank and the bytes in them; a broadcast is one to every other rank."""
+    """Messages sent by this rank and the bytes in them."""
     flops: float = 0.0
     """Floating-point operations of the dense and sparse algebra, estimated."""
     seconds: float = 0.0
@@ -39,15 +38,10 @@ class Tally:
     """Wall time [s] spent waiting for messages."""
 
     def sent(self, sent: Sent) -> Sent:
-        """Add messages under way; returns them."""
-        self.messages += sent.messages
+        """Add a message under way; returns it."""
+        self.messages += 1
         self.bytes += sent.bytes
         return sent
-
-    def broadcast(self, array: NDArray[np.generic], ranks: int) -> None:
-        """Add a broadcast of `array` from this rank."""
-        self.messages += ranks - 1
-        self.bytes += (ranks - 1) * array.nbytes
 
     @contextmanager
     def running(self) -> Iterator[None]:

@@ -1,14 +1,19 @@
 """Products of tall matrices that several ranks share by rows."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
 
 from carillon.arrays import Array
-from solver.distribution.collective import Sent, receive_arrays, send_arrays
+from solver.distribution.collective import AnyArray, Sent, receive_arrays, send_arrays
 from solver.hcms.counts import Tally, product_flops
 
 _ASKED, _ANSWERED = 23, 24
 _PRODUCT, _TRANSPOSED = 0, 1
+
+Factors = tuple[Array, Array]
+"""Two matrices to be multiplied."""
 
 
 class Crew:
@@ -19,49 +24,50 @@ class Crew:
         self.helpers = helpers
         self.tally = tally
 
-    def product(self, tall: Array, small: Array) -> Array:
-        """Product of `tall` (r, k) and `small` (k, c); each rank multiplies some of the rows."""
-        result = np.empty((len(tall), small.shape[1]))
-        first, *others = row_slices(len(tall), 1 + len(self.helpers))
-        small = np.ascontiguousarray(small)
-        asked = [
-            self._ask(rank, _PRODUCT, tall[rows], small)
-            for rank, rows in zip(self.helpers, others, strict=True)
-        ]
-        result[first] = _product(_PRODUCT, tall[first], small, self.tally)
-        for rank, rows in zip(self.helpers, others, strict=True):
-            result[rows] = self._answer(rank)
-        for messages in asked:
-            messages.wait()
-        return result
+    def products(self, factors: Sequence[Factors]) -> list[Array]:
+        """Products of each `tall` (r, k) with `small` (k, c); each rank multiplies some rows."""
+        parts = self._by_all(_PRODUCT, factors)
+        return [np.concatenate(each) if len(each) > 1 else each[0] for each in zip(*parts)]
 
-    def transposed_product(self, left: Array, right: Array) -> Array:
-        """Product of the transpose of `left` (r, k) with `right` (r, c), summed over the ranks."""
-        first, *others = row_slices(len(left), 1 + len(self.helpers))
-        asked = [
-            self._ask(rank, _TRANSPOSED, left[rows], right[rows])
-            for rank, rows in zip(self.helpers, others, strict=True)
+    def transposed_products(self, factors: Sequence[Factors]) -> list[Array]:
+        """Products of the transpose of each `left` (r, k) with `right` (r, c), of all rows."""
+        first, *others = self._by_all(_TRANSPOSED, factors)
+        for part in others:
+            for result, share in zip(first, part, strict=True):
+                result += share
+        return first
+
+    def _by_all(self, kind: int, factors: Sequence[Factors]) -> list[list[Array]]:
+        """What this rank and each of the others make of their rows; one message each way."""
+        if not factors:
+            return [[]]
+        cuts = [row_slices(len(first), 1 + len(self.helpers)) for first, _ in factors]
+        own, *others = [
+            [
+                (first[rows], second if kind == _PRODUCT else second[rows])
+                for (first, second), rows in zip(factors, slices, strict=True)
+            ]
+            for slices in zip(*cuts, strict=True)
         ]
-        result = _product(_TRANSPOSED, left[first], right[first], self.tally)
+        asked = [
+            self._send(rank, [np.array([kind]), *(each for pair in share for each in pair)])
+            for rank, share in zip(self.helpers, others, strict=True)
+        ]
+        parts = [_products(kind, own, self.tally)]
         for rank in self.helpers:
-            result += self._answer(rank)
-        for messages in asked:
-            messages.wait()
-        return result
+            with self.tally.idle():
+                parts.append(receive_arrays(self.comm, rank, _ANSWERED))
+        for message in asked:
+            message.wait()
+        return parts
 
     def dismiss(self) -> None:
         """Let the helpers go."""
         for rank in self.helpers:
-            self.tally.sent(send_arrays(self.comm, [], rank, _ASKED)).wait()
+            self._send(rank, []).wait()
 
-    def _ask(self, rank: int, kind: int, first: Array, second: Array) -> Sent:
-        arrays = [np.array([kind]), first, second]
+    def _send(self, rank: int, arrays: list[AnyArray]) -> Sent:
         return self.tally.sent(send_arrays(self.comm, arrays, rank, _ASKED))
-
-    def _answer(self, rank: int) -> Array:
-        with self.tally.idle():
-            (part,) = receive_arrays(self.comm, rank, _ANSWERED)
-        return part
 
 
 def help_with_products(comm: MPI.Comm, rank: int, tally: Tally) -> None:
@@ -71,9 +77,9 @@ def help_with_products(comm: MPI.Comm, rank: int, tally: Tally) -> None:
             arrays = receive_arrays(comm, rank, _ASKED)
         if not arrays:
             return
-        kind, first, second = arrays
-        part = _product(int(kind[0]), first, second, tally)
-        tally.sent(send_arrays(comm, [part], rank, _ANSWERED)).wait()
+        kind, *shares = arrays
+        parts = _products(int(kind[0]), list(zip(shares[::2], shares[1::2], strict=True)), tally)
+        tally.sent(send_arrays(comm, parts, rank, _ANSWERED)).wait()
 
 
 def row_slices(rows: int, ranks: int) -> list[slice]:
@@ -88,7 +94,6 @@ def row_slices(rows: int, ranks: int) -> list[slice]:
     return [slice(start, stop) for start, stop in zip(bounds[:-1], bounds[1:], strict=True)]
 
 
-def _product(kind: int, first: Array, second: Array, tally: Tally) -> Array:
-    rows, columns = first.shape
-    tally.flops += product_flops(rows, columns, second.shape[1])
-    return np.asarray(first @ second if kind == _PRODUCT else first.T @ second)
+def _products(kind: int, factors: Sequence[Factors], tally: Tally) -> list[Array]:
+    tally.flops += sum(product_flops(*first.shape, second.shape[1]) for first, second in factors)
+    return [first @ second if kind == _PRODUCT else first.T @ second for first, second in factors]

@@ -8,6 +8,7 @@ where only rows of V1 and V2 at nodes of straddling cells matter.  The diagonal 
 group alone, so each is formed where the group lies.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -93,6 +94,11 @@ class Interface:
         split = 3 * len(self.left)
         return matrix[:split, :split], matrix[split:, split:], matrix[split:, :split]
 
+    @property
+    def mass_across(self) -> sp.csr_matrix:
+        """Block 21 of the mass, which alone is not zero but for symmetry."""
+        return self.blocks(self.mass)[2]
+
 
 def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) -> Interface:
     """Interface between the groups of rows [start, middle) and [middle, stop).
@@ -123,20 +129,18 @@ def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) 
     return Interface(rows[:count], rows[count:], K, M)
 
 
-def project(modes: Array, matrix: sp.csr_matrix, others: Array, crew: Crew) -> Array:
-    """modes^T matrix others, for a sparse matrix; the dense product is shared by the crew."""
-    if matrix.nnz == 0:
-        return np.zeros((modes.shape[1], others.shape[1]))
-    crew.tally.flops += sparse_product_flops(matrix.nnz, others.shape[1])
-    return crew.transposed_product(modes, np.asarray(matrix @ others))
-
-
-def across_mass(left: Group, right: Group, between: Interface, crew: Crew) -> Array | None:
-    """V2^T dM21 V1 (k2, k1); None if no mass is shared by the groups."""
-    if between.mass.nnz == 0:
-        return None
-    modes = left.modes_at(between.left), right.modes_at(between.right)
-    return project(modes[1], between.blocks(between.mass)[2], modes[0], crew)
+def project(terms: Sequence[tuple[Array, sp.csr_matrix, Array]], crew: Crew) -> list[Array]:
+    """modes^T matrix others of each term, for sparse matrices; the crew shares dense products."""
+    factors = []
+    for modes, matrix, others in terms:
+        crew.tally.flops += sparse_product_flops(matrix.nnz, others.shape[1])
+        if matrix.nnz:
+            factors.append((modes, np.asarray(matrix @ others)))
+    products = iter(crew.transposed_products(factors))
+    return [
+        next(products) if matrix.nnz else np.zeros((modes.shape[1], others.shape[1]))
+        for modes, matrix, others in terms
+    ]
 
 
 class Reduced(NamedTuple):
@@ -147,25 +151,25 @@ class Reduced(NamedTuple):
 
 
 def reduced_pencil(
-    values: tuple[Array, Array], stiffness: tuple[Array, Array, Array], mass_across: Array | None
+    left: Array, right: Array, stiffness: Sequence[Array], mass_across: Array
 ) -> Reduced:
     """Pencil of the joined groups in the space of their kept modes.
 
     Parameters
     ----------
-    values
-        Eigenvalues of the left and of the right group.
+    left, right
+        Eigenvalues (k1,) and (k2,) of either group.
     stiffness
         V1^T dK11 V1 (k1, k1), V2^T dK22 V2 (k2, k2) and V2^T dK21 V1 (k2, k1).
     mass_across
-        V2^T dM21 V1 (k2, k1); None if it is zero.
+        V2^T dM21 V1 (k2, k1).
     """
-    split = len(values[0])
-    size = split + len(values[1])
+    split = len(left)
+    size = split + len(right)
     K = np.zeros((size, size), order="F")
     K[:split, :split], K[split:, split:], K[split:, :split] = stiffness
-    K[np.diag_indices(size)] += np.concatenate(values)
-    if mass_across is None:
+    K[np.diag_indices(size)] += np.concatenate([left, right])
+    if not mass_across.any():
         return Reduced(K, None)
     M = np.zeros((size, size), order="F")
     M[split:, :split] = mass_across
@@ -207,6 +211,10 @@ def join(left: Group, right: Group, values: Array, Q: Array, crew: Crew) -> Grou
     boundary, cells = boundary_of(left.cells.join(third), left.start, right.stop)
     count = int(np.searchsorted(boundary, left.stop))
     modes = np.empty((3 * len(boundary), Q.shape[1]))
-    modes[: 3 * count] = crew.product(left.modes_at(boundary[:count]), Q[:split])
-    modes[3 * count :] = crew.product(right.modes_at(boundary[count:]), Q[split:])
+    modes[: 3 * count], modes[3 * count :] = crew.products(
+        [
+            (left.modes_at(boundary[:count]), np.ascontiguousarray(Q[:split])),
+            (right.modes_at(boundary[count:]), np.ascontiguousarray(Q[split:])),
+        ]
+    )
     return Group(left.start, right.stop, values, boundary, modes, cells)

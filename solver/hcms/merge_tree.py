@@ -16,7 +16,6 @@ from solver.hcms.merge import (
     Group,
     Interface,
     Reduced,
-    across_mass,
     all_pairs,
     group_from_arrays,
     interface,
@@ -118,7 +117,7 @@ class Ascent:
             whole = self._reduce_alone(step, Crew(self.comm, (), tally))
         elif self.comm.rank in sides:
             crew = Crew(self.comm, crews[0 if self.comm.rank == here else 1], tally)
-            whole = self._reduce_together(step, crew)
+            whole = self._reduce_together(step, self.plan.exchanges[number], crew)
             crew.dismiss()
         pairs = self._pairs(self.plan.teams[number], whole, tally)
         if helped:
@@ -131,33 +130,41 @@ class Ascent:
     def _reduce_alone(self, step: Merge, crew: Crew) -> _Whole | None:
         """Pencil of two groups of the same rank, on the holder of what becomes of them."""
         there, here = self.plan.holder[step.left], self.plan.holder[step.group]
-        if self.comm.rank == there != here:
-            for child in (step.left, step.right):
-                self._send(self.groups.pop(child).arrays(), here, crew.tally)
+        children = step.left, step.right
+        if self.comm.rank == there:
+            groups = [self.groups.pop(child) for child in children]
+            if there != here:
+                arrays = [array for group in groups for array in group.arrays()]
+                self._send(arrays, here, crew.tally)
         if self.comm.rank != here:
             return None
-        left, right = (
-            self.groups.pop(child)
-            if there == here
-            else self._receive_group(child, there, crew.tally)
-            for child in (step.left, step.right)
-        )
+        if there != here:
+            arrays = self._receive(there, crew.tally)
+            half = len(arrays) // 2
+            groups = [
+                self._group(child, each)
+                for child, each in zip(children, (arrays[:half], arrays[half:]), strict=True)
+            ]
+        left, right = groups
         between = self._interface(step, left.cells)
-        modes = left.modes_at(between.left), right.modes_at(between.right)
-        within_left, within_right, across = between.blocks(between.stiffness)
-        stiffness = (
-            project(modes[0], within_left, modes[0], crew),
-            project(modes[1], within_right, modes[1], crew),
-            project(modes[1], across, modes[0], crew),
+        first, second = left.modes_at(between.left), right.modes_at(between.right)
+        *within, coupling = between.blocks(between.stiffness)
+        *stiffness, mass = project(
+            [
+                (first, within[0], first),
+                (second, within[1], second),
+                (second, coupling, first),
+                (second, between.mass_across, first),
+            ],
+            crew,
         )
-        mass = across_mass(left, right, between, crew)
-        return _Whole(left, right, reduced_pencil((left.values, right.values), stiffness, mass))
+        return _Whole(left, right, reduced_pencil(left.values, right.values, stiffness, mass))
 
-    def _reduce_together(self, step: Merge, crew: Crew) -> _Whole | None:
+    def _reduce_together(self, step: Merge, exchange: bool, crew: Crew) -> _Whole | None:
         """Pencil of two groups of different ranks, on the holder of what becomes of them.
 
-        Either forms the stiffness of its own group; in addition the holder the mass across, the
-        other rank the stiffness.
+        Either forms the stiffness of its own group, and the other rank sends it with the group.
+        With an `exchange` it also forms the stiffness across, for which it gets the holder's modes.
         """
         holder, tally = self.plan.holder, crew.tally
         here = self.comm.rank == holder[step.group]
@@ -165,27 +172,34 @@ class Ascent:
         if self.comm.rank != holder[ours]:
             ours, theirs = theirs, ours
         partner, mine = holder[theirs], self.groups.pop(ours)
-        if not here:
+        if exchange and not here:
             self._send(mine.arrays(), partner, tally)
         between = self._interface(step, mine.cells)
         side = 0 if ours == step.left else 1
         *within, coupling = between.blocks(between.stiffness)
         modes = mine.modes_at((between.left, between.right)[side])
-        if here:
+        if exchange and here:
             self._send([modes], partner, tally)
-        own = project(modes, within[side], modes, crew)
+        stiffness = project([(modes, within[side], modes)], crew)
         if not here:
-            (others,) = self._receive(partner, tally)
-            left_modes, right_modes = (modes, others) if ours == step.left else (others, modes)
-            across = project(right_modes, coupling, left_modes, crew)
-            self._send([own, across], partner, tally)
+            if exchange:
+                modes_of = modes, *self._receive(partner, tally)
+                stiffness += project([(modes_of[1 - side], coupling, modes_of[side])], crew)
+            self._send(stiffness if exchange else [*stiffness, *mine.arrays()], partner, tally)
             return None
-        other = self._receive_group(theirs, partner, tally)
-        left, right = (mine, other) if ours == step.left else (other, mine)
-        mass = across_mass(left, right, between, crew)
-        others, across = self._receive(partner, tally)
-        sides = (own, others) if ours == step.left else (others, own)
-        pencil = reduced_pencil((left.values, right.values), (*sides, across), mass)
+        arrays = self._receive(partner, tally)
+        others = [] if exchange else [arrays.pop(0)]
+        other = self._group(theirs, arrays)
+        left, right = (mine, other) if side == 0 else (other, mine)
+        first, second = left.modes_at(between.left), right.modes_at(between.right)
+        terms = [(second, between.mass_across, first)]
+        if not exchange:
+            terms.append((second, coupling, first))
+        mass, *across = project(terms, crew)
+        if exchange:
+            others, across = ([each] for each in self._receive(partner, tally))
+        stiffness = [*stiffness, *others] if side == 0 else [*others, *stiffness]
+        pencil = reduced_pencil(left.values, right.values, [*stiffness, *across], mass)
         return _Whole(left, right, pencil)
 
     def _pairs(
@@ -228,6 +242,5 @@ class Ascent:
         with tally.idle():
             return receive_arrays(self.comm, rank, _UP)
 
-    def _receive_group(self, group: int, rank: int, tally: Tally) -> Group:
-        arrays = self._receive(rank, tally)
+    def _group(self, group: int, arrays: list[AnyArray]) -> Group:
         return group_from_arrays(arrays, *self.ranges[group], self.local_mesh.cells)

@@ -20,6 +20,10 @@ from solver.hcms.scalapack import available, grid_side
 
 MOVED_COST = 0.3
 """Addition to the cost of a merge if both its groups have to be sent."""
+MESSAGE_COST = 3e7
+"""Operations in the time of a message that a rank waits for: three ways over a link of 1 ms."""
+ACROSS_COST = 1.5
+"""Operations of the stiffness across a merge for each of n^2 and (nodes)^(2/3), about."""
 PRODUCT_COST = 60.0
 """Operations of a merge's products for each of n^2 reduced unknowns and (nodes)^(2/3), about."""
 SHARED_PRODUCTS = 1e9
@@ -61,6 +65,9 @@ class Schedule:
     crews: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
     """(merges,) ranks that help the holder with its products, and those that help the rank of the
     other group with its own."""
+    exchanges: tuple[bool, ...]
+    """(merges,) whether the rank of the other group makes the stiffness across, for which the two
+    send each other more."""
 
     def ranks_of(self, number: int, step: Merge) -> set[int]:
         """All ranks that have a part in merge `step`, of this number."""
@@ -87,33 +94,61 @@ def schedule(
     first = np.searchsorted(owner, np.arange(len(free)))
     holder = owner.tolist()
     done = [0.0] * tree.parts
-    teams, crews = [], []
-    for step, (start, stop) in zip(tree.merges, tree.ranges()[tree.parts :], strict=True):
-        size = modes[step.left] + modes[step.right]
+    teams, crews, exchanges = [], [], []
+    sizes = [modes[step.left] + modes[step.right] for step in tree.merges]
+    levels, single, later = tree.levels(), *_single_ranks(tree, owner)
+    # Of merges that are still to be dealt, by level, those of each rank's own subdomains.
+    own = np.zeros((levels[-1] + 1, len(free)))
+    for step, size in zip(tree.merges, sizes, strict=True):
+        if step.group in single:
+            own[levels[step.group], single[step.group]] += eigen_flops(size, True)
+    ranges = tree.ranges()[tree.parts :]
+    for step, size, (start, stop) in zip(tree.merges, sizes, ranges, strict=True):
         cost = eigen_flops(size, True)
+        if step.group in single:
+            own[levels[step.group], single[step.group]] -= cost
+        face = size**2 * nodes[step.group] ** (2.0 / 3.0)
         ready = max(done[step.left], done[step.right])
         here, there = holder[step.left], holder[step.right]
         team: tuple[int, ...]
         helpers: list[int] = []
         if here == there:
-            end = np.maximum(free, ready) + (1.0 + MOVED_COST) * cost
-            end[here] -= MOVED_COST * cost
+            # What is sent away comes back.
+            moved = MOVED_COST * cost + 2.0 * MESSAGE_COST
+            end = np.maximum(free + own[levels[step.group]], ready) + cost + moved
+            end[here] = max(free[here], ready) + cost
             # Of equals, the one that has the groups; it is free once they are sent.
             there = here if end[here] <= end.min() else int(np.argmin(end))
             team = (there,)
         else:
-            if free[there] < free[here]:
+            if later.get(step.group) == there:
+                here, there = there, here
+            # From there the group is sent on, and what comes of it back.
+            onward = 2.0 * MESSAGE_COST if later.get(step.group) == here else 0.0
+            if free[there] + onward < free[here]:
                 here, there = there, here
             inside = np.flatnonzero((first >= start) & (first < stop))
             others = [int(rank) for rank in inside if rank not in (here, there)]
             most = max(1, int((size / SHARED_SIZE) ** 2)) if available() else 1
             team = (here, there, *others)[: grid_side(min(2 + len(others), most)) ** 2]
-            products = PRODUCT_COST * size**2 * nodes[step.group] ** (2.0 / 3.0)
-            helpers = others[: int(products / SHARED_PRODUCTS)]
+            helpers = others[: int(PRODUCT_COST * face / SHARED_PRODUCTS)]
         finish = max(ready, *(free[rank] for rank in team)) + cost / len(team)
         free[[*team, *helpers, there]] = finish
         holder.append(team[0])
         done.append(finish)
         teams.append(team)
         crews.append((tuple(helpers[::2]), tuple(helpers[1::2])))
-    return Schedule(tuple(holder), tuple(teams), tuple(crews))
+        exchanges.append(ACROSS_COST * face > MESSAGE_COST)
+    return Schedule(tuple(holder), tuple(teams), tuple(crews), tuple(exchanges))
+
+
+def _single_ranks(
+    tree: MergeTree, owner: NDArray[np.integer]
+) -> tuple[dict[int, int], dict[int, int]]:
+    """The rank of all subdomains of a group, and of all that it is merged with, if it is one."""
+    ranks = [(int(owner[start]), int(owner[stop - 1])) for start, stop in tree.ranges()]
+    single = {group: first for group, (first, last) in enumerate(ranks) if first == last}
+    pairs = [(step.left, step.right) for step in tree.merges]
+    partners = dict([*pairs, *((right, left) for left, right in pairs)])
+    later = {group: single[other] for group, other in partners.items() if other in single}
+    return single, later

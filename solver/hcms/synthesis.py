@@ -1,11 +1,11 @@
 """Hierarchical component mode synthesis over MPI ranks (section 7.2).
 
 Upward, every merge happens on one rank, its holder, see `solver.hcms.schedule`.  Where the groups
-are on two ranks, one sends its group's eigenvalues, boundary cells and the rows of its modes there,
-gets those of the other's modes that it needs, and forms its part of the reduced pencil; large
-pencils are solved by several ranks.  Downward, the coefficients of the final modes travel back
-along the tree, so that the full basis is formed once, from the small local bases, and stays
-distributed by rows.
+are on two ranks, one sends its group's eigenvalues, boundary cells, the rows of its modes there and
+its part of the reduced pencil in one message; large pencils are solved by several ranks.  Downward,
+the coefficients of the final modes travel back along the tree in as many, so that the full basis is
+formed once, from the small local bases, and stays distributed by rows.  Ranks wait for the merges
+that theirs are made of and for no others.
 """
 
 from dataclasses import dataclass
@@ -18,6 +18,7 @@ from carillon.fem.block import degrees_of_freedom
 from carillon.processes.threads import in_parallel
 from solver.distribution.collective import receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh
+from solver.distribution.tree import Merge
 from solver.hcms.condense import DEFAULT_INTERFACE
 from solver.hcms.counts import Counts, krylov_flops, product_flops
 from solver.hcms.kept_groups import KeptGroups
@@ -104,8 +105,7 @@ def synthesize(
             kept.forget()
         raise
     with climb.counts.down.running():
-        values = climb.root_values()
-        weights = climb.push_down()
+        values, weights = climb.push_down()
     with climb.counts.basis.running():
         vectors = climb.form_basis(weights)
     return Synthesis(values, vectors, climb.counts)
@@ -183,53 +183,45 @@ class _Climb:
         """Eigenvalue up to which a group keeps its modes; the whole keeps a number."""
         return self.cutoff if group < len(self.ranges) - 1 else None
 
-    def root_values(self) -> Array:
-        """Eigenvalues of the whole, on every rank."""
-        comm, root, leader = self.comm, len(self.ranges) - 1, self.holder[-1]
-        count = np.zeros(1, dtype=np.int64)
-        values = np.empty(0)
-        if comm.rank == leader:
-            values = self.groups.pop(root).values
-            count[0] = len(values)
-        with self.counts.down.idle():
-            comm.Bcast(count, root=leader)
-            if comm.rank != leader:
-                values = np.empty(count[0])
-            comm.Bcast(values, root=leader)
-        if comm.rank == leader:
-            self.counts.down.broadcast(count, comm.size)
-            self.counts.down.broadcast(values, comm.size)
-        return values
+    def push_down(self) -> tuple[Array, dict[int, Array]]:
+        """Eigenvalues of the whole, and what its modes are in the local bases of this rank.
 
-    def push_down(self) -> dict[int, Array]:
-        """Coefficients of the final modes in every local basis of this rank; none if undivided."""
-        tally = self.counts.down
+        Coefficients (k, modes) are by number of the subdomain; none if the whole is one. A rank
+        gets eigenvalues and coefficients in one message.
+        """
+        tally, holder = self.counts.down, self.holder
         weights: dict[int, Array] = {}
-        sent = []
+        values, sent = np.empty(0), []
+        if self.comm.rank == holder[-1]:
+            values = self.groups.pop(len(self.ranges) - 1).values
         for step in reversed(self.tree.merges):
-            here = self.holder[step.group]
-            # The right side first: more often another rank is waiting for it.
+            here = holder[step.group]
+            # Those of one other rank at most: it is waiting for them.
+            away = [child for child in (step.left, step.right) if holder[child] != here]
             if self.comm.rank == here:
-                above = weights.pop(step.group, None)
-                sides = self.ascent.coefficients.pop(step.group)
-                for child, side in zip((step.right, step.left), reversed(sides)):
-                    block = side if above is None else side @ above
-                    if above is not None:
-                        tally.flops += product_flops(len(side), len(above), above.shape[1])
-                    if self.holder[child] == here:
-                        weights[child] = block
-                    else:
-                        messages = send_arrays(self.comm, [block], self.holder[child], _DOWN)
-                        sent.append(tally.sent(messages))
-            else:
-                for child in (step.right, step.left):
-                    if self.comm.rank == self.holder[child]:
-                        with tally.idle():
-                            (weights[child],) = receive_arrays(self.comm, here, _DOWN)
+                blocks = self._coefficients(step, weights.pop(step.group, None))
+                if away:
+                    arrays = [values, *(blocks.pop(child) for child in away)]
+                    messages = send_arrays(self.comm, arrays, holder[away[0]], _DOWN)
+                    sent.append(tally.sent(messages))
+                weights |= blocks
+            elif away and self.comm.rank == holder[away[0]]:
+                with tally.idle():
+                    values, *received = receive_arrays(self.comm, here, _DOWN)
+                weights |= dict(zip(away, received, strict=True))
         with tally.idle():
             for messages in sent:
                 messages.wait()
-        return weights
+        return values, weights
+
+    def _coefficients(self, step: Merge, above: Array | None) -> dict[int, Array]:
+        """Those of the whole's modes in the children's, from those in the group's own `above`."""
+        sides = dict(zip((step.left, step.right), self.ascent.coefficients.pop(step.group)))
+        if above is None:
+            return sides
+        for side in sides.values():
+            self.counts.down.flops += product_flops(len(side), len(above), above.shape[1])
+        return {child: side @ above for child, side in sides.items()}
 
     def form_basis(self, weights: dict[int, Array]) -> Array:
         """This rank's rows of the final modes; frees the local bases."""

@@ -27,8 +27,6 @@ from solver.hcms.synthesis import local_steps
 from solver.rank_scaling import DENSE_PROBLEM, Share, factorisation, products, solves
 
 REAL_BYTES = 8
-MERGE_MESSAGES = 10
-"""Messages that a rank sends for a merge with the group of another."""
 
 Work = dict[str, Tally]
 
@@ -89,7 +87,8 @@ def _synthesis(
     plan, levels = schedule(tree, owner, nodes, keep), tree.levels()
     phases = {f"merge {level}": _tallies(ranks) for level in range(1, levels[-1] + 1)}
     down = _tallies(ranks)
-    for step, team, crews in zip(tree.merges, plan.teams, plan.crews, strict=True):
+    merges = zip(tree.merges, plan.teams, plan.crews, plan.exchanges, strict=True)
+    for step, team, crews, exchange in merges:
         merge = phases[f"merge {levels[step.group]}"]
         here, size = plan.holder[step.group], modes[step.left] + modes[step.right]
         products = _product_flops(nodes, modes, step, root=step.group == len(nodes) - 1)
@@ -105,12 +104,10 @@ def _synthesis(
                 down[here].flops += product_flops(modes[child], modes[step.group], modes[-1])
             if there != here:
                 rows = min(3.0 * nodes[child], 3.0 * _boundary(nodes[child]))
-                merge[there].messages += MERGE_MESSAGES
+                merge[there].messages += 2 if exchange else 1
                 merge[there].bytes += REAL_BYTES * modes[child] * (rows + size)
-                down[here].messages += 2
+                down[here].messages += 1
                 down[here].bytes += REAL_BYTES * modes[child] * modes[-1]
-    down[plan.holder[-1]].messages += 2 * (ranks - 1)
-    down[plan.holder[-1]].bytes += REAL_BYTES * (ranks - 1) * (1 + modes[-1])
     return {name: _largest(tallies) for name, tallies in {**phases, "down": down}.items()}
 
 
