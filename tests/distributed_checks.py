@@ -31,7 +31,7 @@ from solver.assembly.sparse import assembled
 from solver.assembly.system import Layout, assemble
 from solver.distribution import collective
 from solver.distribution.collective import receive_arrays, send_arrays, share_cores
-from solver.distribution.local_mesh import LocalMesh, distribute
+from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import write_modes
 from solver.hcms import schedule as scheduling
 from solver.hcms.condense import INTERFACES

@@ -103,12 +103,12 @@ def test_a_rank_that_has_as_much_to_do_as_the_others_makes_its_own_merges(ranks,
 def test_large_merges_are_shared_and_small_ones_are_not(monkeypatch):
     *_, small = plan(4, 16, 60)
     assert all(len(team) == 1 for team in small.teams)
-    *_, large = plan(4, 16, 1200)
+    *_, large = plan(4, 16, 4800)
     assert len(large.teams[-1]) == (16 if available() else 1)
     *_, wide = plan(4, 16, 300, [200_000.0] * 16)
     assert len(wide.crews[-1][0]) == len(wide.crews[-1][1]) == 7
     monkeypatch.setattr(scheduling, "available", lambda: False)
-    assert all(len(team) == 1 for team in plan(4, 16, 1200)[-1].teams)
+    assert all(len(team) == 1 for team in plan(4, 16, 4800)[-1].teams)
 
 
 @pytest.mark.parametrize("ranks", [1, 4, 9])

@@ -66,7 +66,7 @@ def _modes_to_keep(local_mesh: LocalMesh, options: SolverOptions, together: bool
     if keep is None:
         parts = local_mesh.decomposition.tree.parts
         keep = (
-            default_keep(options.modes, parts, together and options.is_corrected)
+            default_keep(options.modes, parts, together)
             if options.corrections
             else uncorrected_keep(options.modes, parts)
         )

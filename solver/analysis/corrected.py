@@ -70,7 +70,8 @@ class CorrectedModes:
         self._report = report
         self._components: ComponentModes | None = None
         if options.method == "hcms":
-            self._components = ComponentModes(local_mesh, options, self._together, comm)
+            together = options.is_corrected and self._together
+            self._components = ComponentModes(local_mesh, options, together, comm)
 
     @property
     def _together(self) -> bool:

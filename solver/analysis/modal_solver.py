@@ -100,7 +100,9 @@ class ModalSolver:
                 self.local_mesh = prepared.local_mesh
         with phases("analysis"):
             if prepared is None:
-                prepared = Prepared.of_mesh(self.local_mesh, comm, options.linear_solver)
+                uncorrected = options.method == "hcms" and options.corrections == 0
+                prepare = Prepared.without_analysis if uncorrected else Prepared.of_mesh
+                prepared = prepare(self.local_mesh, comm, options.linear_solver)
             self._layout, self._linear = prepared.layout, prepared.linear
             self._is_by_choice = False
             if options.method == "lanczos" and not self._linear.indefinite:
@@ -267,6 +269,15 @@ class Prepared:
         cls, local_mesh: LocalMesh, comm: MPI.Comm, linear_solver: str = "auto"
     ) -> Prepared:
         """Prepare a mesh that is distributed; collective."""
+        prepared = cls.without_analysis(local_mesh, comm, linear_solver)
+        prepared.linear.method  # noqa: B018
+        return prepared
+
+    @classmethod
+    def without_analysis(
+        cls, local_mesh: LocalMesh, comm: MPI.Comm, linear_solver: str = "auto"
+    ) -> Prepared:
+        """The same, but for what linear systems alone need, which is made for the first one."""
         layout = Layout.of_local_mesh(local_mesh, comm)
         return cls(local_mesh, layout, LinearSolver(linear_solver, layout))
 

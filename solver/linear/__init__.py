@@ -112,7 +112,8 @@ class Approximate:
 class LinearSolver:
     """Makes inverses of one mesh for any material and shift.
 
-    What depends on the mesh alone is computed once, here. Raises UserError for an unknown method.
+    What depends on the mesh alone is computed once: when `method` or an inverse is first asked for,
+    by all ranks. Raises UserError for an unknown method.
 
     Parameters
     ----------
@@ -126,12 +127,16 @@ class LinearSolver:
     def __init__(self, method: str, layout: Layout) -> None:
         self._layout = layout
         _require_method(method)
-        if method == "auto":
-            method = "multifrontal" if self.tree.fits(MEMORY_SHARE) else "amg-cg"
-        self.method = method
-        if method == "multifrontal":
-            # What depends on the mesh alone.
+        self._asked = method
+
+    @cached_property
+    def method(self) -> str:
+        """The method, which `auto` stands for; collective when first asked for."""
+        if self._asked == "auto":
+            return "multifrontal" if self.tree.fits(MEMORY_SHARE) else "amg-cg"
+        if self._asked == "multifrontal":
             self.tree  # noqa: B018
+        return self._asked
 
     def by(self, method: str) -> LinearSolver:
         """Solver by another method, which shares what was computed of the mesh."""
