@@ -95,5 +95,6 @@ def row_slices(rows: int, ranks: int) -> list[slice]:
 
 
 def _products(kind: int, factors: Sequence[Factors], tally: Tally) -> list[Array]:
-    tally.flops += sum(product_flops(*first.shape, second.shape[1]) for first, second in factors)
+    for first, second in factors:
+        tally.flops += product_flops(first.shape[0], first.shape[1], second.shape[1])
     return [first @ second if kind == _PRODUCT else first.T @ second for first, second in factors]
