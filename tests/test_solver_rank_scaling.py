@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.linear.plan import STRIP
+from solver.linear.panels import STRIP
 from solver.rank_scaling import (
     PANEL,
     factorisation,

@@ -10,10 +10,11 @@ from carillon.arrays import Array
 from carillon.errors import LocalConvergenceError
 from carillon.numerics.simd import compiler
 from carillon.processes.threads import in_parallel, split
-from solver.linear import plan as plans
-from solver.linear.plan import PANEL, STRIP, Part, Plan, packed_size
+from solver.linear import panels
+from solver.linear.panels import PANEL, STRIP, packed_size, panels_of
+from solver.linear.plan import Plan
 
-compiled = compiler(Path(__file__), Path(plans.__file__))
+compiled = compiler(Path(__file__), Path(panels.__file__))
 
 BLOCKED = 64
 """Columns that LAPACK eliminates together, for which it needs room."""
@@ -50,45 +51,56 @@ def eliminate_fronts(
     def eliminated(front: int, room: Array, threads: int = 1) -> int:
         n, b = int(own_rows[front]), int(outside[front])
         own = room[: n * (n + b)].reshape(n, n + b)
-        own[:] = 0.0
-        _add_entries(own, plan.entries[front], stiffness, mass, shift)
         # A piece that nothing connects to the rest has no update.
         children = [child for child in plan.children[front] if child in updates]
-        for child in children:
-            _subtract_from_own(own, plan.places[child], updates[child])
+
+        def assemble(first: int, stop: int) -> None:
+            own[3 * first : 3 * stop] = 0.0
+            _add_entries(own, first, stop, plan.entries[front], stiffness, mass, shift)
+            for child in children:
+                _subtract_from_own(own, first, stop, plan.places[child], updates[child])
+
+        def update_strip(first: int) -> None:
+            _update_strip(own, inverses, coupling, update, first)
+            for child in children:
+                _add_beyond(update, b, first // 3, n // 3, plan.places[child], updates[child])
+
+        in_parallel(assemble, split(n // 3, threads, max(n, 1)), threads)
         pivots = coupling = None
         if kept is not None:
             pivots = kept[0][plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
             coupling = kept[1][plan.coupling_offset[front] : plan.coupling_offset[front + 1]]
-        inverses, negative = _eliminate_panels(own, pivots)
+        inverses, negative = _eliminate_panels(own, pivots, threads)
         if b:
-            update = _update(own, inverses, coupling, threads)
+            update = np.empty(packed_size(b), dtype)
+            in_parallel(update_strip, [(first,) for first in range(0, b, STRIP)], threads)
             if front == last and plan.kept:
                 _subtract_entries(update, b, plan.kept_entries, stiffness, mass, shift)
-            for child in children:
-                _add_beyond(update, b, n // 3, plan.places[child], updates.pop(child))
             updates[front] = update
+        for child in children:
+            del updates[child]
         return negative
 
-    def eliminated_part(part: Part, threads: int = 1) -> int:
-        numbers = part.fronts
-        largest = (own_rows[numbers] * (own_rows[numbers] + outside[numbers])).max()
+    def eliminated_part(first: int, stop: int, threads: int = 1) -> int:
+        largest = (own_rows[first:stop] * (own_rows + outside)[first:stop]).max()
         room = np.empty(int(largest), dtype)
-        return sum(eliminated(int(front), room, threads) for front in numbers)
+        return sum(eliminated(front, room, threads) for front in range(first, stop))
 
     # The fronts above the branches are few and large: threads share each of them.
-    tree = plan.shares(threads)
-    branches = [(part,) for part, below in zip(tree.parts, tree.children, strict=True) if not below]
+    shares = plan.shares(threads)
+    branches = [shares.ranges[number] for number in shares.branches]
     negative = sum(in_parallel(eliminated_part, branches, threads))
-    for part, below in zip(tree.parts, tree.children, strict=True):
-        if below:
-            negative += eliminated_part(part, threads)
+    for part, shared in zip(shares.ranges, shares.shared, strict=True):
+        if shared:
+            negative += eliminated_part(*part, threads)
     rest = updates.pop(last).astype(float, copy=False) if plan.kept else np.empty(0)
     np.negative(rest, out=rest)
     return negative, rest
 
 
-def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], int]:
+def _eliminate_panels(
+    own: Array, pivots: Array | None, threads: int
+) -> tuple[list[Array], int]:
     """Eliminate the own rows of a front, a panel of them at a time.
 
     Returns the inverses of the diagonal blocks, and how many of their eigenvalues are negative.
@@ -101,26 +113,37 @@ def _eliminate_panels(own: Array, pivots: Array | None) -> tuple[list[Array], in
     pivots
         What becomes of each panel's own columns: the inverse of its diagonal block, and the product
         with it of what couples the panel to the panels after.
+    threads
+        They share the columns beyond.
     """
     n = len(own)
+    panels = panels_of(n)
     scaled = np.empty((n, n), own.dtype)
     inverses: list[Array] = []
     negative = place = 0
-    for start, stop in split(n, 1, PANEL):
-        rows = own[start:stop, start:]
+
+    def take_off(start: int, stop: int, first: int, last: int) -> None:
+        own[start:stop, first:last] -= scaled[:start, start:stop].T @ own[:start, first:last]
+
+    def take_off_beyond(first: int, last: int) -> None:
+        for start, stop in panels[1:]:
+            take_off(start, stop, n + first, n + last)
+
+    for start, stop in panels:
         if start:
-            rows -= scaled[:start, start:stop].T @ own[:start, start:]
-        size = stop - start
-        inverse, below = inverse_of(rows[:, :size])
+            take_off(start, stop, start, n)
+        inverse, below = inverse_of(own[start:stop, start:stop])
         inverses.append(inverse)
         negative += below
         later = scaled[start:stop, stop:]
-        np.matmul(inverse, rows[:, size : n - start], out=later)
+        np.matmul(inverse, own[start:stop, stop:n], out=later)
         if pivots is None:
             continue
         for part in (inverse, later):
             pivots[place : place + part.size].reshape(part.shape)[:] = part
             place += part.size
+    if len(panels) > 1:
+        in_parallel(take_off_beyond, split(own.shape[1] - n, threads, own.shape[1]), threads)
     return inverses, negative
 
 
@@ -140,11 +163,10 @@ def inverse_of(block: Array) -> tuple[Array, int]:
     return result, negative
 
 
-def _update(own: Array, inverses: list[Array], coupling: Array | None, threads: int) -> Array:
-    """What the elimination of the own rows takes off the rows beyond, packed.
-
-    Returns the upper triangle of a symmetric matrix: strips of rows, each a rectangle that begins
-    at its first diagonal entry, what is left of the diagonal being anything.
+def _update_strip(
+    own: Array, inverses: list[Array], coupling: Array | None, update: Array, first: int
+) -> None:
+    """What the elimination of the own rows takes off a strip of the rows beyond.
 
     Parameters
     ----------
@@ -153,35 +175,35 @@ def _update(own: Array, inverses: list[Array], coupling: Array | None, threads: 
     coupling
         The inverses times the own rows' columns beyond become this, a strip of columns after the
         other.
+    update
+        Upper triangle of a symmetric matrix: strips of rows, each a rectangle that begins at its
+        first diagonal entry, what is left of the diagonal being anything.
+    first
+        Row beyond that the strip begins with.
     """
     n = len(own)
     beyond = own[:, n:]
     b = beyond.shape[1]
-    update = np.empty(packed_size(b), own.dtype)
-    panels = split(n, 1, PANEL)
-
-    def strip(first: int) -> None:
-        last = min(first + STRIP, b)
-        if coupling is None:
-            scaled = np.empty((n, last - first), own.dtype)
-        else:
-            scaled = coupling[n * first : n * last].reshape(n, last - first)
-        for (start, stop), inverse in zip(panels, inverses, strict=True):
-            np.matmul(inverse, beyond[start:stop, first:last], out=scaled[start:stop])
-        place = packed_size(b) - packed_size(b - first)
-        size = (last - first) * (b - first)
-        rows = update[place : place + size].reshape(last - first, b - first)
-        for start, stop in split(last - first, 1, PANEL):
-            left = scaled[:, start:stop].T
-            np.matmul(left, beyond[:, first + start :], out=rows[start:stop, start:])
-
-    in_parallel(strip, [(first,) for first in range(0, b, STRIP)], threads)
-    return update
+    last = min(first + STRIP, b)
+    if coupling is None:
+        scaled = np.empty((n, last - first), own.dtype)
+    else:
+        scaled = coupling[n * first : n * last].reshape(n, last - first)
+    for (start, stop), inverse in zip(panels_of(n), inverses, strict=True):
+        np.matmul(inverse, beyond[start:stop, first:last], out=scaled[start:stop])
+    place = packed_size(b) - packed_size(b - first)
+    size = (last - first) * (b - first)
+    rows = update[place : place + size].reshape(last - first, b - first)
+    for start, stop in split(last - first, 1, PANEL):
+        np.matmul(scaled[:, start:stop].T, beyond[:, first + start :], out=rows[start:stop, start:])
 
 
 @compiled
-def _add_entries(matrix, entries, stiffness, mass, shift):  # type: ignore[no-untyped-def]
-    for entry in range(entries.shape[0]):
+def _add_entries(matrix, first, stop, entries, stiffness, mass, shift):  # type: ignore[no-untyped-def]
+    """Entries of the rows of the nodes from `first` to `stop`."""
+    for entry in range(np.searchsorted(entries[:, 0], first), entries.shape[0]):
+        if entries[entry, 0] >= stop:
+            break
         row, column, number = 3 * entries[entry, 0], 3 * entries[entry, 1], entries[entry, 2]
         for i in range(3):
             for j in range(3):
@@ -209,31 +231,29 @@ def _row(packed, size, row):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _subtract_from_own(own, places, update):  # type: ignore[no-untyped-def]
-    count, size = own.shape[0] // 3, 3 * len(places)
-    for a in range(len(places)):
-        if places[a] >= count:
-            break
+def _subtract_from_own(own, first, stop, places, update):  # type: ignore[no-untyped-def]
+    """What a child leaves of the rows of the nodes from `first` to `stop`."""
+    size = 3 * len(places)
+    for a in range(np.searchsorted(places, first), np.searchsorted(places, stop)):
         for i in range(3):
             target = own[3 * places[a] + i]
-            source, first = _row(update, size, 3 * a + i)
+            source, start = _row(update, size, 3 * a + i)
             for b in range(a, len(places)):
                 for j in range(3):
-                    target[3 * places[b] + j] -= source[3 * b + j - first]
+                    target[3 * places[b] + j] -= source[3 * b + j - start]
 
 
 @compiled
-def _add_beyond(total, total_size, count, places, update):  # type: ignore[no-untyped-def]
-    size = 3 * len(places)
-    for a in range(len(places)):
-        if places[a] < count:
-            continue
+def _add_beyond(total, total_size, first, count, places, update):  # type: ignore[no-untyped-def]
+    """What a child leaves of the rows beyond in the strip from the node `first` on."""
+    size, stop = 3 * len(places), count + first + STRIP // 3
+    for a in range(np.searchsorted(places, count + first), np.searchsorted(places, stop)):
         for i in range(3):
             target, start = _row(total, total_size, 3 * (places[a] - count) + i)
-            source, first = _row(update, size, 3 * a + i)
+            source, begin = _row(update, size, 3 * a + i)
             for b in range(a, len(places)):
                 for j in range(3):
-                    target[3 * (places[b] - count) + j - start] += source[3 * b + j - first]
+                    target[3 * (places[b] - count) + j - start] += source[3 * b + j - begin]
 
 
 @compiled

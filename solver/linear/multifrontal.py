@@ -2,8 +2,8 @@
 
 Every front is eliminated by panels of its own rows, which keep the inverse of their diagonal block
 and its product W with what couples them to later rows (Duff & Reid 1983, with inverted pivots).  A
-solve is then nothing but products of dense matrices; threads share the branches of the tree.  Each
-panel pivots within itself, so the matrix need not be definite.
+solve is then nothing but products of dense matrices; threads share the branches of the tree, and
+the fronts above them.  Each panel pivots within itself, so the matrix need not be definite.
 """
 
 from collections.abc import Callable
@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from carillon.errors import LocalConvergenceError
-from carillon.numerics.small_gemm import block, lanes_of
+from carillon.numerics.simd import empty
+from carillon.numerics.simd_width import LANES
+from carillon.numerics.small_gemm import lanes_of
 from carillon.processes.memory import available_memory
-from carillon.processes.threads import in_parallel, in_tree, split
+from carillon.processes.threads import in_parallel, split
 from solver.linear.elimination import eliminate_fronts
-from solver.linear.plan import Part, Plan
-from solver.linear.sweeps import add_nodes, copy_nodes, eliminate, put_rows, substitute, take_rows
+from solver.linear.plan import Plan
+from solver.linear.sweeps import COUNTERS, down, up
 
 COLUMNS = 64
 """Number of right-hand sides that go through the fronts together."""
@@ -77,47 +79,46 @@ class Factor:
         solution = np.empty_like(vectors)
 
         def solve(start: int, stop: int, threads: int) -> None:
-            works = self._up(vectors, start, stop, threads)
-            self._down(works, solution, start, stop, threads)
+            work = self._up(vectors, start, stop, threads)
+            self._down(work, solution, start, stop, threads)
 
         self._in_columns(solve, vectors.shape[1])
         return solution
 
-    def eliminate(self, vectors: Array) -> tuple[dict[int, list[Array]], Array]:
+    def eliminate(self, vectors: Array) -> tuple[dict[int, Array], Array]:
         """First half of a solve: up the tree.
 
         Returns what `substitute` needs of it, and what the elimination adds to the right-hand sides
         of the nodes that the plan keeps (3 kept, k).
         """
-        plan, works = self._plan, {}
-        added = np.zeros((3 * plan.kept, vectors.shape[1]))
+        works: dict[int, Array] = {}
+        added = np.zeros((3 * self._plan.kept, vectors.shape[1]))
 
-        def up(start: int, stop: int, threads: int) -> None:
+        def climb(start: int, stop: int, threads: int) -> None:
             works[start] = self._up(vectors, start, stop, threads)
-            work, part = works[start][-1], plan.shares(threads).parts[-1]
-            lanes, kept = lanes_of(stop - start), np.arange(plan.kept)
-            put_rows(
-                work[3 * len(part.positions) * lanes :], kept, lanes, added, start, stop - start
-            )
+            added[:, start:stop] = self._kept_rows(works[start], stop - start)
 
-        self._in_columns(up, vectors.shape[1])
+        self._in_columns(climb, vectors.shape[1])
         return works, added
 
-    def substitute(self, works: dict[int, list[Array]], kept: Array, solution: Array) -> None:
+    def substitute(self, works: dict[int, Array], kept: Array, solution: Array) -> None:
         """Second half of a solve: down the tree, from the solution (3 kept, k) of the kept nodes.
 
         The rows of the others go to `solution` (3 n, k).
         """
-        plan = self._plan
 
-        def down(start: int, stop: int, threads: int) -> None:
-            work, part = works[start][-1], plan.shares(threads).parts[-1]
-            lanes, nodes = lanes_of(stop - start), np.arange(plan.kept)
-            rows = work[3 * len(part.positions) * lanes :]
-            take_rows(kept, start, stop - start, nodes, lanes, rows)
-            self._down(works.pop(start), solution, start, stop, threads)
+        def descend(start: int, stop: int, threads: int) -> None:
+            work = works.pop(start)
+            self._kept_rows(work, stop - start)[:] = kept[:, start:stop]
+            self._down(work, solution, start, stop, threads)
 
-        self._in_columns(down, kept.shape[1])
+        self._in_columns(descend, kept.shape[1])
+
+    def _kept_rows(self, work: Array, width: int) -> Array:
+        """Rows of the kept nodes in a block, which come after all that are eliminated."""
+        plan, size = self._plan, lanes_of(width) * LANES
+        nodes = len(plan.fronts.order)
+        return work.reshape(-1, size)[3 * (nodes - plan.kept) : 3 * nodes, :width]
 
     def _in_columns(self, work: Callable[[int, int, int], None], width: int) -> None:
         """Call `work` with ranges of columns and the number of threads for each.
@@ -129,56 +130,27 @@ class Factor:
         ranges = split(width, sharing, COLUMNS)
         in_parallel(work, [(start, stop, each) for start, stop in ranges], sharing)
 
-    def _up(self, vectors: Array, start: int, stop: int, threads: int) -> list[Array]:
-        """Forward sweep for the columns [start, stop), and the inverse pivots: a block a part."""
-        tree, width = self._plan.shares(threads), stop - start
-        order, lanes = self._plan.fronts.order, lanes_of(width)
-        works: list[Array] = [np.empty(0)] * len(tree.parts)
+    def _up(self, vectors: Array, start: int, stop: int, threads: int) -> Array:
+        """Forward sweep for the columns [start, stop): a block for `_down`."""
+        shares, lanes = self._plan.shares(threads), lanes_of(stop - start)
+        work = empty(3 * shares.rows * lanes)
+        self._sweep(up, shares.up, (vectors, start, stop - start, work, lanes), threads)
+        return work
 
-        def up(number: int) -> None:
-            part = tree.parts[number]
-            work = block(3 * (len(part.positions) + len(part.beyond)), lanes)
-            take_rows(vectors, start, width, order[part.positions], lanes, work)
-            for child in tree.children[number]:
-                first = 3 * len(tree.parts[child].positions)
-                add_nodes(works[child], first, tree.inherited[child], lanes, work)
-            self._sweep(eliminate, part, work, lanes)
-            works[number] = work
+    def _down(self, work: Array, solution: Array, start: int, stop: int, threads: int) -> None:
+        """Inverse pivots, and backward sweep of a block of `_up`."""
+        tickets, lanes = self._plan.shares(threads).down, lanes_of(stop - start)
+        self._sweep(down, tickets, (solution, start, stop - start, work, lanes), threads)
 
-        in_tree(up, tree.parent, threads)
-        return works
-
-    def _down(
-        self, works: list[Array], solution: Array, start: int, stop: int, threads: int
-    ) -> None:
-        """Backward sweep of the blocks of `_up`."""
-        tree, width = self._plan.shares(threads), stop - start
-        order, lanes = self._plan.fronts.order, lanes_of(width)
-
-        def down(number: int) -> None:
-            part, work, above = tree.parts[number], works[number], tree.parent[number]
-            if above >= 0:
-                first = 3 * len(part.positions)
-                copy_nodes(works[above], first, tree.inherited[number], lanes, work)
-            self._sweep(substitute, part, work, lanes)
-            put_rows(work, order[part.positions], lanes, solution, start, width)
-
-        in_tree(down, tree.parent, threads, from_root=True)
-
-    def _sweep(self, kernel: Any, part: Part, work: Array, lanes: int) -> None:
-        plan = self._plan
-        kernel(
-            work,
-            lanes,
-            part.fronts,
-            part.first,
-            part.near,
-            part.near_offset,
-            self._pivots,
-            plan.pivot_offset,
-            self._coupling,
-            plan.coupling_offset,
-        )
+    def _sweep(self, kernel: Any, tickets: Index, block: tuple[Any, ...], threads: int) -> None:
+        plan, shares = self._plan, self._plan.shares(threads)
+        counters = np.zeros(1 + COUNTERS * len(shares.ranges), dtype=np.int64)
+        tree = shares.parts, shares.child_offset, shares.child, shares.taken_offset, shares.taken
+        fronts = plan.fronts
+        nodes = fronts.first, fronts.offset, fronts.order, shares.near, fronts.beyond
+        factor = self._pivots, plan.pivot_offset, self._coupling, plan.coupling_offset
+        arguments = *block, counters, tickets, tree, nodes, factor
+        in_parallel(kernel, [arguments] * threads, threads)
 
 
 def require_memory(unknowns: int, needed: int) -> None:

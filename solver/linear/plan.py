@@ -2,100 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from carillon.arrays import Index
-from carillon.processes.threads import split
 from solver.linear.dissection import Fronts, dissect
+from solver.linear.panels import packed_size, pivot_entries
+from solver.linear.shares import BRANCHES, Shares
 
-PANEL = 120
-"""Number of rows of a front that are eliminated together."""
-STRIP = 192
-"""Number of columns of W, and of rows of an update, that lie together in memory: whole nodes."""
-BRANCHES = 3
-"""Least number of branches for each thread, since their work is not equal."""
 MEMORY_MARGIN = 1.2
 """Memory of fronts and updates as a multiple of the need of one thread, since several are at
 work."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """Some fronts with the rows that they eliminate, and those beyond that they are coupled to."""
-
-    fronts: Index
-    """Their numbers, ascending."""
-    positions: Index
-    beyond: Index
-    """Positions in the elimination order of the part's own rows and of the rows beyond,
-    ascending."""
-    first: Index
-    """(fronts + 1,) first own row of each front, one a node."""
-    near: Index
-    near_offset: Index
-    """Rows that each front is coupled to, in compressed form: own rows, then rows beyond."""
-
-    def rows_of(self, positions: Index) -> Index:
-        """Rows of positions that the part has: own rows, then rows beyond."""
-        if not len(self.positions):
-            return np.searchsorted(self.beyond, positions)
-        place = np.minimum(np.searchsorted(self.positions, positions), len(self.positions) - 1)
-        outside = len(self.positions) + np.searchsorted(self.beyond, positions)
-        return np.where(self.positions[place] == positions, place, outside)
-
-    @classmethod
-    def of_fronts(cls, whole: Fronts, fronts: Index) -> Part:
-        """Part of these fronts, which holds all that lies between any of them in the tree."""
-        none = np.empty(0, dtype=np.int64)
-        starts, stops = whole.first[fronts], whole.first[fronts + 1]
-        positions = np.concatenate([none, *map(np.arange, starts, stops)])
-        boundary = [whole.boundary[front] for front in fronts]
-        near = np.concatenate([none, *boundary])
-        beyond = np.setdiff1d(near, positions)
-        counts = np.array([len(rows) for rows in boundary], dtype=np.int64)
-        part = cls(
-            fronts,
-            positions,
-            beyond,
-            np.concatenate([[0], np.cumsum(stops - starts)]),
-            near,
-            np.concatenate([[0], np.cumsum(counts)]),
-        )
-        return replace(part, near=part.rows_of(near))
-
-
-@dataclass(frozen=True)
-class Shares:
-    """All fronts in parts that threads work on: branches of the tree, and single fronts above."""
-
-    parts: list[Part]
-    """Children before parents."""
-    parent: list[int]
-    """Number of each part's parent, -1 for a root."""
-    children: list[list[int]]
-    """Numbers of each part's children."""
-    inherited: list[Index]
-    """Rows of each part's `beyond` in its parent: own rows, then rows beyond."""
-
-    @classmethod
-    def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]]) -> Shares:
-        """Parts of consecutive fronts, the last of which is above all the others."""
-        parts = [Part.of_fronts(whole, np.arange(*each)) for each in ranges]
-        part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in ranges])
-        above = whole.parent[[stop - 1 for _, stop in ranges]]
-        parent = [int(part_of[front]) if front >= 0 else -1 for front in above]
-        children: list[list[int]] = [[] for _ in parts]
-        inherited = []
-        for number, (part, place) in enumerate(zip(parts, parent, strict=True)):
-            rows = part.beyond[:0]
-            if place >= 0:
-                children[place].append(number)
-                rows = parts[place].rows_of(part.beyond)
-            inherited.append(rows)
-        return cls(parts, parent, children, inherited)
 
 
 class Plan:
@@ -136,7 +54,7 @@ class Plan:
         self.places = fronts.places()
         own = self.own_rows = 3 * np.diff(fronts.first)
         outside = self.outside_rows = 3 * np.diff(fronts.offset)
-        self.pivot_offset = np.concatenate([[0], np.cumsum([_pivot_entries(n) for n in own])])
+        self.pivot_offset = np.concatenate([[0], np.cumsum([pivot_entries(n) for n in own])])
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
         self.bytes_of_updates = int(8 * MEMORY_MARGIN * self._most_at_a_time(own, outside))
         kept = self.pivot_offset[-1] + self.coupling_offset[-1]
@@ -159,7 +77,9 @@ class Plan:
     def shares(self, threads: int) -> Shares:
         """How the fronts are shared among threads; made once for each number of them."""
         if threads not in self._shares:
-            self._shares[threads] = Shares.of_ranges(self.fronts, self._ranges(threads))
+            self._shares[threads] = Shares.of_ranges(
+                self.fronts, self._ranges(threads), self._work
+            )
         return self._shares[threads]
 
     def _ranges(self, threads: int) -> list[tuple[int, int]]:
@@ -185,14 +105,3 @@ class Plan:
             alone.append(big)
         ranges = [(front + 1 - int(size[front]), front + 1) for front in branches]
         return sorted(ranges + [(front, front + 1) for front in alone])
-
-
-def _pivot_entries(n: int) -> int:
-    """Entries of the panels of n own rows, each from its first column on."""
-    return sum((stop - start) * (n - start) for start, stop in split(n, 1, PANEL))
-
-
-def packed_size(rows: int) -> int:
-    """Entries of a symmetric matrix whose upper triangle is kept in strips of rows."""
-    strips, rest = divmod(rows, STRIP)
-    return strips * STRIP * rows - STRIP * STRIP * strips * (strips - 1) // 2 + rest * rest

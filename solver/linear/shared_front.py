@@ -14,7 +14,7 @@ from mpi4py import MPI
 from carillon.arrays import Array, Index
 from carillon.numerics.simd import compiler
 from carillon.processes.threads import split
-from solver.linear.plan import STRIP
+from solver.linear.panels import STRIP
 
 compiled = compiler(Path(__file__))
 
