@@ -21,6 +21,7 @@ from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import rigid_motions
 from carillon.fem.elements import Elements
 from carillon.processes.petsc import PETSc
+from solver.assembly import narrow
 from solver.assembly.halo import Halo
 from solver.assembly.node_rows import NodeRows, Pattern
 from solver.distribution.collective import compute_on_root, gather_rows
@@ -103,6 +104,8 @@ class System:
 
     def inner(self, left: Array, right: Array) -> Array:
         """left^T right summed over the ranks; equal on all ranks."""
+        if narrow.is_narrow(left, right):
+            return self.summed(narrow.inner(left, right, self.rows.threads))
         return self.summed(left.T @ right)
 
     def column_products(self, left: Array, right: Array) -> Array:

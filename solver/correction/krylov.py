@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg as la
 
 from carillon.arrays import Array, Index
+from solver.assembly.narrow import combination
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.linear import Inverse
@@ -123,8 +124,8 @@ class KrylovBasis:
         """Q and M Q with Q^T M Q = I and Q R = `block`, and R, come next."""
         system = self._system
         weights, condition = bcast_from_root(system.comm, lambda: orthonormal(gram))
-        self.remainder = block @ weights
-        self._mass_remainder = mass_block @ weights
+        self.remainder = combination(block, weights, system.rows.threads)
+        self._mass_remainder = combination(mass_block, weights, system.rows.threads)
         self._coupling = weights.T @ gram
         for _ in range(MOST_PASSES):
             if condition > INDEPENDENT:
@@ -133,7 +134,7 @@ class KrylovBasis:
             self._sweep(self.remainder)
             again = system.inner(self.remainder, system.times_mass(self.remainder))
             weights, condition = bcast_from_root(system.comm, partial(orthonormal, again))
-            self.remainder = self.remainder @ weights
+            self.remainder = combination(self.remainder, weights, system.rows.threads)
             self._mass_remainder = system.times_mass(self.remainder)
             self._coupling = system.inner(self._mass_remainder, block)
         room = system.n_dofs - self._rigid - self.size

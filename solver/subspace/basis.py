@@ -6,16 +6,18 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.numerics import small_gemm
-from carillon.numerics.simd import compiler
+from carillon.numerics.simd import compiler, load_tile, store_tile, subtract_product
 from carillon.numerics.simd_width import LANES
-from carillon.numerics.small_gemm import DEPTH, ROWS_NEAR, lanes_of, subtract
-from carillon.processes.threads import in_parallel, split
+from carillon.numerics.small_gemm import DEPTH, ROWS, ROWS_NEAR, WIDE, lanes_of
+from carillon.processes.threads import in_parallel
+from solver.assembly.narrow import ROWS_COMBINED, add_inner, as_lanes, ranges
 from solver.assembly.system import System
 
 compiled = compiler(Path(__file__), Path(small_gemm.__file__))
 
-ROWS_COMBINED = 512
-"""Number of rows of all blocks that are brought together for a product."""
+BLOCKS_NEAR = 4
+"""Number of blocks whose product with their weights is summed in registers: so many weights stay
+near."""
 
 
 class BlockBasis:
@@ -58,12 +60,12 @@ class BlockBasis:
 
     def inner(self, vectors: Array) -> Array:
         """Products (size, k) of all basis vectors with `vectors` (local, k); equal on all ranks."""
-        block, lanes = _as_lanes(vectors)
+        block, lanes = as_lanes(vectors)
         height = self._count * self._width
 
         def part(start: int, stop: int) -> Array:
             sums = np.zeros((height * lanes, LANES))
-            _add_inner(self._flat(), self._count, self._rows, block, lanes, start, stop, sums)
+            add_inner(self._flat(), self._count, self._rows, block, lanes, start, stop, sums)
             return sums
 
         total = np.asarray(sum(in_parallel(part, self._ranges(DEPTH), self._threads)))
@@ -72,7 +74,7 @@ class BlockBasis:
 
     def remove(self, overlap: Array, vectors: Array) -> None:
         """Subtract the basis vectors times `overlap` (size, k) from `vectors` (local, k)."""
-        block, lanes = _as_lanes(vectors)
+        block, lanes = as_lanes(vectors)
         spread = np.zeros((self._count * self._width, lanes * LANES))
         spread[self._columns, : vectors.shape[1]] = overlap
         weights = spread.reshape(-1, LANES)
@@ -108,44 +110,55 @@ class BlockBasis:
         return self._blocks.reshape(-1)
 
     def _ranges(self, grain: int) -> list[tuple[int, int]]:
-        """Rows of each thread, in whole grains."""
-        pieces = split(-(-self._rows // grain), self._threads, max(self._rows, 1))
-        return [(grain * start, min(grain * stop, self._rows)) for start, stop in pieces]
-
-
-def _as_lanes(vectors: Array) -> tuple[Array, int]:
-    """The same rows as a block of lanes, a view if they fill the registers; registers to a row."""
-    rows, columns = vectors.shape
-    lanes = lanes_of(columns)
-    if columns == lanes * LANES and vectors.flags.c_contiguous:
-        return vectors.reshape(-1, LANES), lanes
-    padded = np.zeros((rows, lanes * LANES))
-    padded[:, :columns] = vectors
-    return padded.reshape(-1, LANES), lanes
-
-
-@compiled
-def _add_inner(  # type: ignore[no-untyped-def]
-    blocks, count, rows, vectors, lanes, start, stop, sums
-):
-    width = len(sums) // (lanes * count) if count else 0
-    for first in range(start, stop, DEPTH):
-        depth = min(DEPTH, stop - first)
-        for number in range(count):
-            entries = (blocks, (number * rows + first) * width, 1, width)
-            result = (sums, number * width, lanes)
-            subtract(entries, width, depth, (vectors, first, lanes), result)
-    sums[:] = -sums
+        return ranges(self._rows, self._threads, grain)
 
 
 @compiled
 def _subtract(  # type: ignore[no-untyped-def]
     blocks, count, rows, weights, lanes, start, stop, vectors
 ):
-    width = len(weights) // (lanes * count) if count else 0
     for first in range(start, stop, ROWS_NEAR):
-        height = min(ROWS_NEAR, stop - first)
-        for number in range(count):
-            entries = (blocks, (number * rows + first) * width, width, 1)
-            factor = (weights, number * width, lanes)
-            subtract(entries, height, width, factor, (vectors, first, lanes))
+        last = min(first + ROWS_NEAR, stop)
+        for number in range(0, count, BLOCKS_NEAR):
+            few = (number, min(number + BLOCKS_NEAR, count), count, rows)
+            column = 0
+            while column < lanes:
+                wide = min(WIDE, lanes - column)
+                if wide == 4:
+                    _subtract_strip(blocks, few, weights, lanes, first, last, vectors, column, 4)
+                elif wide == 3:
+                    _subtract_strip(blocks, few, weights, lanes, first, last, vectors, column, 3)
+                elif wide == 2:
+                    _subtract_strip(blocks, few, weights, lanes, first, last, vectors, column, 2)
+                else:
+                    _subtract_strip(blocks, few, weights, lanes, first, last, vectors, column, 1)
+                column += wide
+
+
+@compiled
+def _subtract_strip(  # type: ignore[no-untyped-def]
+    blocks, few, weights, lanes, first, last, vectors, column, wide
+):
+    """Some blocks times their weights off some rows of `wide` (a literal) registers."""
+    row = first
+    while row + ROWS <= last:
+        _subtract_tile(blocks, few, weights, lanes, row, vectors, column, ROWS, wide)
+        row += ROWS
+    while row < last:
+        _subtract_tile(blocks, few, weights, lanes, row, vectors, column, 1, wide)
+        row += 1
+
+
+@compiled
+def _subtract_tile(  # type: ignore[no-untyped-def]
+    blocks, few, weights, lanes, row, vectors, column, high, wide
+):
+    begin, end, count, rows = few
+    width = len(weights) // (lanes * count)
+    at = (vectors, row * lanes + column, lanes, 1)
+    sums = load_tile(at, high, wide)
+    for number in range(begin, end):
+        left = (blocks, (number * rows + row) * width, width, 1)
+        right = (weights, number * width * lanes + column, 1, lanes)
+        sums = subtract_product(sums, left, right, width)
+    store_tile(at, sums)
