@@ -56,6 +56,21 @@ def test_solutions_are_those_of_a_direct_solver(mesh, threads, inside):
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("columns", [1, 7, 24, 50])
+def test_threads_that_share_fronts_find_the_same_bits_again(columns):
+    """Who takes a ticket differs from run to run."""
+    rows, plan, planes = problem(solids.box_mesh(12, 12, 12))
+    # Fronts above the branches have several panels and slices.
+    assert sum(plan.shares(3).shared) >= 3 and (plan.shares(3).parts[:, 5] > 2).any()
+    block = np.random.default_rng(1).standard_normal((3 * len(planes), columns))
+    one = Factor(plan, rows.stiffness, rows.mass, -1.0).solve(block)
+    factor = Factor(plan, rows.stiffness, rows.mass, -1.0, threads=3)
+    first = factor.solve(block)
+    np.testing.assert_allclose(first, one, atol=1e-9 * np.abs(one).max())
+    for _ in range(20):
+        np.testing.assert_array_equal(factor.solve(block), first)
+
+
 @pytest.mark.parametrize("mesh", MESHES)
 def test_every_node_is_eliminated_once_and_fronts_hold_what_they_are_coupled_to(mesh):
     rows, plan, planes = problem(MESHES[mesh]())

@@ -1,43 +1,43 @@
-"""Work on trees and in narrow blocks that threads share."""
+"""Work that threads share by tickets, and products with narrow blocks."""
 
 import numpy as np
 import pytest
+from numba import njit
 
 from carillon.numerics.simd_width import LANES
 from carillon.numerics.small_gemm import block, lanes_of, subtract
-from carillon.processes.threads import in_tree
+from carillon.numerics.tickets import increase, wait_for
+from carillon.processes.threads import in_parallel
 
-PARENTS = [2, 2, 6, 5, 5, 6, -1, 8, -1]
+PARENTS = np.array([2, 2, 6, 5, 5, 6, -1, 8, -1])
+
+
+@njit(nogil=True)
+def climb(counters, parents, values):
+    """Every number of a tree waits for its children, and adds what they have to its own."""
+    taken = increase(counters, 0)
+    while taken < len(parents):
+        for below in range(taken):
+            if parents[below] == taken:
+                wait_for(counters, 1 + below, 1)
+                values[taken] += values[below]
+        increase(counters, 1 + taken)
+        taken = increase(counters, 0)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
-@pytest.mark.parametrize("from_root", [False, True])
-def test_a_tree_is_gone_through_in_order(threads, from_root):
-    done = []
-
-    def work(number):
-        before = (
-            [PARENTS[number]] if from_root else [i for i, p in enumerate(PARENTS) if p == number]
-        )
-        assert set(before) - {-1} <= set(done)
-        done.append(number)
-
-    in_tree(work, PARENTS, threads, from_root)
-    assert sorted(done) == list(range(len(PARENTS)))
+def test_tickets_wait_for_what_earlier_ones_made(threads):
+    for _ in range(100):
+        counters, values = np.zeros(1 + len(PARENTS), dtype=np.int64), np.ones(len(PARENTS))
+        in_parallel(climb, [(counters, PARENTS, values)] * threads, threads)
+        assert values.tolist() == [1.0, 1.0, 3.0, 1.0, 1.0, 3.0, 7.0, 1.0, 2.0]
+        assert counters[0] == len(PARENTS) + threads and (counters[1:] == 1).all()
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_what_goes_wrong_in_a_tree_is_raised_and_nothing_above_is_done(threads):
-    done = []
-
-    def work(number):
-        if number == 2:
-            raise ValueError("planted")
-        done.append(number)
-
-    with pytest.raises(ValueError, match="planted"):
-        in_tree(work, PARENTS, threads)
-    assert 6 not in done
+def test_one_thread_does_all_tickets_if_others_do_not_begin():
+    counters, values = np.zeros(1 + len(PARENTS), dtype=np.int64), np.ones(len(PARENTS))
+    climb(counters, PARENTS, values)
+    assert values[6] == 7.0
 
 
 @pytest.mark.parametrize("width", [1, LANES, 2 * LANES + 1, 5 * LANES])

@@ -18,10 +18,8 @@ Array = NDArray[np.float64]
 
 compiled = compiler(Path(__file__))
 
-ROWS = 6
-"""Rows of a tile, whose sums stay in registers."""
-WIDE = 4 if REGISTERS.number >= 32 else 2
-"""Registers to a row of a tile at most."""
+ROWS, WIDE = (6, 4) if REGISTERS.number >= 32 else (4, 3)
+"""Rows of a tile, and registers to a row at most: its sums stay in registers."""
 DEPTH = 192
 """Products that are added to a tile before it is written back: so much of the block stays near."""
 ROWS_NEAR = 16 * ROWS

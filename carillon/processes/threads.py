@@ -8,7 +8,7 @@ sum that threads share rounds differently.
 import importlib
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, TypeVar
@@ -69,50 +69,6 @@ def in_parallel(
         return [work(*each) for each in arguments]
     with blas_threads(1):
         return list(_pool(threads).map(lambda each: work(*each), arguments))
-
-
-def in_tree(
-    work: Callable[[int], None], parent: Sequence[int], threads: int, from_root: bool = False
-) -> None:
-    """Call `work` with every number of a tree on up to `threads` threads.
-
-    Children, which come before their parents, are finished before these are begun, or the other way
-    round `from_root`.  See `in_parallel` for what `work` must and BLAS does.
-
-    Examples
-    --------
-    >>> called = []
-    >>> in_tree(called.append, [2, 2, -1], threads=2)
-    >>> called[-1], sorted(called)
-    (2, [0, 1, 2])
-    """
-    count = len(parent)
-    if threads == 1 or count == 1:
-        for number in reversed(range(count)) if from_root else range(count):
-            work(number)
-        return
-    after: list[list[int]] = [[] for _ in parent]
-    waiting = [0] * count
-    for number, above in enumerate(parent):
-        if above >= 0:
-            first, then = (above, number) if from_root else (number, above)
-            after[first].append(then)
-            waiting[then] += 1
-    with blas_threads(1):
-        running = {_pool(threads).submit(work, n): n for n in range(count) if not waiting[n]}
-        try:
-            while running:
-                for each in wait(running, return_when=FIRST_COMPLETED).done:
-                    number = running.pop(each)
-                    each.result()
-                    for then in after[number]:
-                        waiting[then] -= 1
-                        if not waiting[then]:
-                            running[_pool(threads).submit(work, then)] = then
-        finally:
-            for each in running:
-                each.cancel()
-            wait(running)
 
 
 @contextmanager

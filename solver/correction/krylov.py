@@ -124,9 +124,11 @@ class KrylovBasis:
         """Q and M Q with Q^T M Q = I and Q R = `block`, and R, come next."""
         system = self._system
         weights, condition = bcast_from_root(system.comm, lambda: orthonormal(gram))
-        self.remainder = combination(block, weights, system.rows.threads)
-        self._mass_remainder = combination(mass_block, weights, system.rows.threads)
         self._coupling = weights.T @ gram
+        # Neither block is needed any more, unless the vectors need another pass.
+        combined = partial(combination, threads=system.rows.threads, reuse=condition > INDEPENDENT)
+        self.remainder: Array = combined(block, weights)
+        self._mass_remainder = combined(mass_block, weights)
         for _ in range(MOST_PASSES):
             if condition > INDEPENDENT:
                 break
@@ -134,7 +136,7 @@ class KrylovBasis:
             self._sweep(self.remainder)
             again = system.inner(self.remainder, system.times_mass(self.remainder))
             weights, condition = bcast_from_root(system.comm, partial(orthonormal, again))
-            self.remainder = combination(self.remainder, weights, system.rows.threads)
+            self.remainder = combined(self.remainder, weights)
             self._mass_remainder = system.times_mass(self.remainder)
             self._coupling = system.inner(self._mass_remainder, block)
         room = system.n_dofs - self._rigid - self.size

@@ -98,9 +98,7 @@ def eliminate_fronts(
     return negative, rest
 
 
-def _eliminate_panels(
-    own: Array, pivots: Array | None, threads: int
-) -> tuple[list[Array], int]:
+def _eliminate_panels(own: Array, pivots: Array | None, threads: int) -> tuple[list[Array], int]:
     """Eliminate the own rows of a front, a panel of them at a time.
 
     Returns the inverses of the diagonal blocks, and how many of their eigenvalues are negative.

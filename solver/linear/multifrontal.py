@@ -34,7 +34,7 @@ class Factor:
 
     Of its pivots `negative` are negative: so many eigenvalues are below the shift, by Sylvester's
     law of inertia. `rest` is the matrix that is left of the nodes that the plan keeps, packed (see
-    `solver.linear.plan.packed_size`). Raises LocalConvergenceError if it would not fit in memory,
+    `solver.linear.panels.packed_size`). Raises LocalConvergenceError if it would not fit in memory,
     or the shift is an eigenvalue to rounding.
 
     Parameters

@@ -77,9 +77,7 @@ class Plan:
     def shares(self, threads: int) -> Shares:
         """How the fronts are shared among threads; made once for each number of them."""
         if threads not in self._shares:
-            self._shares[threads] = Shares.of_ranges(
-                self.fronts, self._ranges(threads), self._work
-            )
+            self._shares[threads] = Shares.of_ranges(self.fronts, self._ranges(threads), self._work)
         return self._shares[threads]
 
     def _ranges(self, threads: int) -> list[tuple[int, int]]:

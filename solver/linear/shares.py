@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Index
 from solver.linear.dissection import Fronts
 from solver.linear.panels import STRIP, panels_of
 
@@ -55,7 +55,7 @@ class Shares:
     Each comes after what it waits for."""
 
     @classmethod
-    def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]], work: Array) -> Shares:
+    def of_ranges(cls, whole: Fronts, ranges: list[tuple[int, int]], work: Index) -> Shares:
         """Parts of consecutive fronts, the last of which is above all the others.
 
         Branches that take much `work` (fronts,) come first.
@@ -133,4 +133,8 @@ def _tickets(parts: Index, shared: list[bool], branches: list[int]) -> tuple[Ind
         # Nothing is to be gathered for the roots: nodes that are kept have rows.
         down.append((slices if parts[number, 2] >= 0 else []) + own[::-1])
     tickets = [ticket for each in reversed(down) for ticket in each] + alone
-    return tuple(np.array(each, dtype=np.int64).reshape(-1, 4) for each in (up, tickets))
+    return _rows_of(up), _rows_of(tickets)
+
+
+def _rows_of(tickets: list[tuple[int, int, int, int]]) -> Index:
+    return np.array(tickets, dtype=np.int64).reshape(-1, 4)

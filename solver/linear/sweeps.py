@@ -32,9 +32,7 @@ def _take(vectors, start, width, order, first, last, lanes, work):  # type: igno
     flat = work.reshape(-1)
     for row in range(first, last):
         place = row * lanes * LANES
-        flat[place : place + width] = vectors[
-            3 * order[row // 3] + row % 3, start : start + width
-        ]
+        flat[place : place + width] = vectors[3 * order[row // 3] + row % 3, start : start + width]
         flat[place + width : place + lanes * LANES] = 0.0
 
 
