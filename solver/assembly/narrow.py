@@ -56,14 +56,10 @@ def inner(left: Array, right: Array, threads: int) -> Array:
     return np.ascontiguousarray(total.reshape(width, -1)[:, : right.shape[1]])
 
 
-def combination(block: Array, weights: Array, threads: int, reuse: bool = False) -> Array:
-    """The columns of a narrow block (n, b) times `weights` (b, k).
-
-    They take the block's place if it may be reused and k = b: new memory takes as long as the
-    product.
-    """
+def combination(block: Array, weights: Array, threads: int) -> Array:
+    """The columns of a narrow block (n, b) times `weights` (b, k)."""
     rows, columns = len(block), weights.shape[1]
-    result = block if reuse and columns == block.shape[1] else np.empty((rows, columns))
+    result = np.empty((rows, columns))
 
     def part(start: int, stop: int) -> None:
         for first in range(start, stop, ROWS_COMBINED):

@@ -125,8 +125,7 @@ class KrylovBasis:
         system = self._system
         weights, condition = bcast_from_root(system.comm, lambda: orthonormal(gram))
         self._coupling = weights.T @ gram
-        # Neither block is needed any more, unless the vectors need another pass.
-        combined = partial(combination, threads=system.rows.threads, reuse=condition > INDEPENDENT)
+        combined = partial(combination, threads=system.rows.threads)
         self.remainder: Array = combined(block, weights)
         self._mass_remainder = combined(mass_block, weights)
         for _ in range(MOST_PASSES):
