@@ -50,7 +50,7 @@ class SolverOptions:
     modes: NumberOfModes = option(256, "number of modes, rigid ones included")
     tolerance: ToleranceOrNone | None = option(
         None,
-        "hcms, lanczos: relative eigenvalue error to correct to "
+        "hcms, lanczos, lobpcg: relative eigenvalue error to correct to "
         f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
     )

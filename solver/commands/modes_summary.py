@@ -3,6 +3,9 @@
 import json
 from typing import Any
 
+import numpy as np
+
+from carillon.arrays import Array
 from carillon.fem.geometry.size import sizes_in_words
 from solver.accuracy.solving import AccuracyRequest, Solved
 from solver.analysis.options import SolverOptions
@@ -14,6 +17,11 @@ REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
 """Words for what is counted as refined."""
 EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
 """Words for the expected errors."""
+
+UNCORRECTED = (
+    "not corrected: eigenvalues are too high, often by 5 to 15%; leave out --corrections 0 to "
+    "correct them"
+)
 
 
 def attributes_of(
@@ -81,6 +89,10 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
         f"{attributes['residual_max']:.1e}, orthogonal to {attributes['orthogonality']:.1e}, "
         f"{total:.1f} s on {attributes['ranks']} rank{'s' if attributes['ranks'] > 1 else ''}"
     )
+    if attributes["method"] == "hcms" and "corrections" not in attributes:
+        print(UNCORRECTED)
+    if attributes.get("inertia_count", -1) == attributes.get("inertia_expected"):
+        print(_counted(attributes, hertz))
     if "missed_tolerance" in attributes:
         print(
             f"tolerance missed: {attributes['corrections']} corrections reached an eigenvalue "
@@ -103,6 +115,16 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
         )
 
 
+def _counted(attributes: dict[str, Any], hertz: Array) -> str:
+    """What the count of eigenvalues says of the modes."""
+    below = float(frequencies(np.array([attributes["inertia_at"]]))[0])
+    count = attributes["inertia_count"]
+    return (
+        f"none is missing: {count} eigenvalues below {below:.2f} Hz were counted, {count} found, "
+        f"of which the {len(hertz)} lowest are written"
+    )
+
+
 def phase_table(by_rank: ByRank) -> str:
     """Lines for people: of each phase what the ranks took on average, and the busiest one.
 
@@ -111,10 +133,10 @@ def phase_table(by_rank: ByRank) -> str:
     >>> took = {"seconds": [2.0, 2.0], "processor_seconds": [1.0, 2.0]}
     >>> took |= {"waiting_seconds": [1.0, 0.0], "peak_memory_bytes": [1e9, 2e9]}
     >>> print(phase_table({"assembly": took}))
-    phase          seconds  processor seconds: mean, most  of rank  ratio  waiting, most  memory
-    assembly          2.00                     1.50  2.00        1   1.33           1.00  2.0 GB
+    phase          seconds  processor seconds: mean, most  by rank  ratio  longest wait  peak so far
+    assembly          2.00                     1.50  2.00        1   1.33          1.00       2.0 GB
     """
-    head = "seconds  processor seconds: mean, most  of rank  ratio  waiting, most  memory"
+    head = "seconds  processor seconds: mean, most  by rank  ratio  longest wait  peak so far"
     lines = [f"{'phase':<14} {head}"]
     for name, took in by_rank.items():
         busy = took["processor_seconds"]
@@ -122,7 +144,7 @@ def phase_table(by_rank: ByRank) -> str:
         ratio = f"{most / mean:.2f}" if mean else "-"
         lines.append(
             f"{name:<14} {max(took['seconds']):7.2f}  {mean:23.2f} {most:5.2f}  "
-            f"{busy.index(most):7d}  {ratio:>5}  {max(took['waiting_seconds']):13.2f}"
-            f"  {max(took['peak_memory_bytes']) / 1e9:3.1f} GB"
+            f"{busy.index(most):7d}  {ratio:>5}  {max(took['waiting_seconds']):12.2f}"
+            f"  {max(took['peak_memory_bytes']) / 1e9:8.1f} GB"
         )
     return "\n".join(lines)

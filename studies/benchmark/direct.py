@@ -155,8 +155,9 @@ def table_lines(result: dict[str, Any]) -> list[str]:
     titles = ["analysis", "factorisation", *(f"in blocks of {width}" for width in BLOCKS)]
     lines = [
         f"{result['n_dofs']:,} unknowns, shift {result['shift']:.3g} rad^2/s^2, "
-        f"{result['right_hand_sides']} right-hand sides, {result['threads']} threads: "
-        "wall / processor seconds",
+        f"threads: {result['threads']}; wall / processor seconds, solves those of all "
+        f"{result['right_hand_sides']} right-hand sides; GFlop/s by wall and, a core, by processor "
+        "time; residual |b - A x| / |b|",
         f"{'':<9}"
         + "".join(f"{title:>17}" for title in titles)
         + f"{'GFlop':>9}{'GFlop/s':>9}{'a core':>8}{'GB':>7}{'residual':>10}",
@@ -164,13 +165,13 @@ def table_lines(result: dict[str, Any]) -> list[str]:
     for name, row in result["solvers"].items():
         seconds = (f"{row[f'wall_{step}']:.3f} / {row[f'processor_{step}']:.3f}" for step in steps)
         rates = [
-            "" if row[key] is None else f"{row[key]:.1f}"
+            "" if row[key] is None else f"{row[key]:.3g}"
             for key in ("gigaflop", "gflops", "gflops_core")
         ]
         lines.append(
             f"{name:<9}"
             + "".join(f"{each:>17}" for each in seconds)
             + f"{rates[0]:>9}{rates[1]:>9}{rates[2]:>8}"
-            + f"{1e-9 * row['bytes']:>7.2f}{row['residual']:>10.1e}"
+            + f"{1e-9 * row['bytes']:>7.2g}{row['residual']:>10.1e}"
         )
     return lines + [f"{name}: {reason}" for name, reason in result["failed"].items()]

@@ -33,14 +33,15 @@ def page(study: Crossover, tables: dict[str, Table]) -> StudyPage:
     return StudyPage(
         title="Which method is the fastest where?",
         kicker="unknowns, modes, ranks and tolerances",
-        lede=f"""{len(runs.rows)} runs in {len(cells.rows)} cases on {machines}: where does the
+        lede=f"""{_counted(len(runs.rows), "run")} in {_counted(len(cells.rows), "case")} on
+            {machines}: where does the
             paper’s HCMS win, with and without error correction, and where does another method?""",
         sections=[
             section(
                 "Verdict",
                 note(study.without),
-                prose(" ".join(verdict(study.runs))),
                 note(disturbed(runs.rows)),
+                prose(" ".join(verdict(study.runs))),
                 grid(tables["methods"]),
             ),
             section("Fastest", *grids),
@@ -79,6 +80,10 @@ def _panel(cells: Table, rows: list[Row], number: int) -> Markup:
         title[0].upper() + title[1:],
         grid(cells, rows, caption=number == 0, by="unknowns"),
     )
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def _failure(row: Row) -> Markup:

@@ -35,10 +35,10 @@ PANEL = (
     Column("label", "Fastest"),
     Column("seconds", "Time", "seconds"),
     Column("second", "Second"),
-    Column("times_second", "takes", "times"),
+    Column("times_second", "second takes", "times"),
     Column("times_slepc", "SLEPc takes", "times"),
-    Column("times_hcms_ec", "HCMS + EC", "times"),
-    Column("times_hcms", "HCMS", "times"),
+    Column("times_hcms_ec", "HCMS + EC takes", "times"),
+    Column("times_hcms", "HCMS takes", "times"),
     Column("error", "its error", "small"),
     Column("auto", "auto chooses"),
     hidden(f"auto{MARK}", "mark of auto"),
@@ -112,7 +112,8 @@ def runs(study: Crossover) -> Iterator[Row]:
     other programs had meanwhile, without which a run would have been faster; the largest
     relative error of an eigenvalue against SLEPc to the smallest tolerance, or another method where
     SLEPc did not end, and whether it is within the tolerance. HCMS without correction runs once for
-    all tolerances."""
+    all tolerances. SLEPc and ARPACK take the tolerance for that of a residual, whose square is
+    about the error of an eigenvalue."""
     return _plain_rows(study.runs)
 
 

@@ -115,8 +115,8 @@ def _plain(runs: pd.DataFrame, best: pd.DataFrame) -> str:
     if reached.empty:
         faster = int((own["times_hcms"] < 1).sum())
         return (
-            f"{begin}, and so reaches no tolerance: it cannot win, although it takes less time "
-            f"than the fastest method that does in {faster} of {_cells(len(own))}."
+            f"{begin}, and so misses every tolerance. It takes less time than the winner in "
+            f"{faster} of {_cells(len(own))}."
         )
     wins = f"wins {len(won)} of these: {_span(won)}" if len(won) else "wins none of these"
     return f"{begin}, within the tolerance in {len(reached)} of {_cells(len(own))}; it {wins}."
