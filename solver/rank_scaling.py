@@ -22,10 +22,6 @@ PANEL = 192
 """Rows that a rank holds together, and that are swept out together: `solver.linear.plan.STRIP`."""
 FRONT_COST = 1.2
 """Time of an operation in a shared front over one in a front of a single rank."""
-RAGGED = 1e4, 0.22
-"""Size up to which parts made of the subdomains of HCMS have as few unknowns between them as parts
-that planes cut, and the power of the size by which they have more beyond: 1.2, 1.6 and 2 times as
-many of 25,000, 78,000 and 251,000 unknowns."""
 RATES = {"factor": 33e9, "solve": 35e9, "dense": 10e9}
 """Operations per second of one core of an AMD EPYC by kind of phase, in large solids."""
 LATENCY, BANDWIDTH = 2e-6, 5e9
@@ -62,37 +58,31 @@ class Share(NamedTuple):
     """Messages that it sends or waits for one after the other, and the bytes in them."""
 
 
-def factorisation(unknowns: float, ranks: int, planes: bool = True) -> tuple[Share, Share]:
-    """Work in the fronts of a single rank and in those that it shares.
-
-    Whether `planes` cut the solid for the ranks, or they have subdomains of HCMS, see `RAGGED`.
-    """
+def factorisation(unknowns: float, ranks: int) -> tuple[Share, Share]:
+    """Work in the fronts of a single rank and in those that it shares."""
     inside = sum(
         2**level * (own**3 / 3.0 + own**2 * beyond + own * beyond**2)
         for level, (own, beyond) in enumerate(_fronts(unknowns))
         if level >= _rounds(ranks)
     )
     flops = size = messages = 0.0
-    wider = 1.0 if planes or ranks == 1 else _ragged(unknowns)
-    for sharing, own, beyond in _shared(unknowns, ranks, planes):
+    for sharing, own, beyond in _shared(unknowns, ranks):
         rows = own + beyond
         # A rank has a strip at least, whose rectangle is as wide as the front.
         strip, panel = min(rows, PANEL), min(own, PANEL)
         flops += FRONT_COST * own * (rows + 2.0 * panel) * (max(rows / sharing, strip) + strip)
         size += 8.0 * (own * rows + (own**2 + rows**2) / sharing)
         messages += ceil(own / PANEL) * _rounds(sharing) + 2.0 * sharing
-    return Share(wider * inside / ranks), Share(flops, size, messages)
+    return Share(inside / ranks), Share(flops, size, messages)
 
 
-def solves(
-    unknowns: float, ranks: int, blocks: float, columns: float, planes: bool = True
-) -> Share:
-    """Work of solves for so many `columns` in all, in so many `blocks`; `planes` as before."""
+def solves(unknowns: float, ranks: int, blocks: float, columns: float) -> Share:
+    """Work of solves for so many `columns` in all, in so many `blocks`."""
     flops = size = messages = 0.0
     for level, (own, beyond) in enumerate(_fronts(unknowns)):
         if level >= _rounds(ranks):
             flops += 2**level * own * (2.0 * own + 4.0 * beyond) / ranks
-    for sharing, own, beyond in _shared(unknowns, ranks, planes):
+    for sharing, own, beyond in _shared(unknowns, ranks):
         flops += max(own / sharing, min(own, PANEL)) * (2.0 * own + 4.0 * beyond)
         size += 24.0 * own
         messages += 2.0 * _rounds(sharing) + sharing
@@ -176,15 +166,10 @@ def _fronts(unknowns: float) -> list[tuple[float, float]]:
     return [_front(first, level) for level in range(levels)]
 
 
-def _shared(unknowns: float, ranks: int, planes: bool) -> list[tuple[float, float, float]]:
+def _shared(unknowns: float, ranks: int) -> list[tuple[float, float, float]]:
     """Ranks that share a front, its own unknowns and those beyond, for the levels shared."""
-    first = SEPARATOR * (unknowns / 3.0) ** (2.0 / 3.0) * (1.0 if planes else _ragged(unknowns))
+    first = SEPARATOR * (unknowns / 3.0) ** (2.0 / 3.0)
     return [(ranks / 2**level, *_front(first, level)) for level in range(_rounds(ranks))]
-
-
-def _ragged(unknowns: float) -> float:
-    size, power = RAGGED
-    return max(1.0, unknowns / size) ** power
 
 
 def _front(first: float, level: int) -> tuple[float, float]:

@@ -32,6 +32,7 @@ from solver.assembly.system import Layout, assemble
 from solver.distribution import collective
 from solver.distribution.collective import receive_arrays, send_arrays, share_cores
 from solver.distribution.local_mesh import distribute
+from solver.distribution.redistribution import Redistribution
 from solver.files.modes_file import write_modes
 from solver.hcms import schedule as scheduling
 from solver.hcms.condense import INTERFACES
@@ -448,6 +449,47 @@ def painted_parts_give_the_bits_of_a_whole_synthesis() -> None:
         assert (modes.vectors == cold.vectors).all()
 
 
+def corrections_of_a_synthesis_have_rows_cut_by_planes() -> None:
+    """The rows are those of Lanczos, the vectors those of the synthesis to the bit."""
+    model = on_first(solids.random_box(9, 6, 5))
+    by_planes = distribute(model, comm=COMM, by_planes=True)
+    by_parts = distribute(model, PARTS, comm=COMM)
+    options = SolverOptions(modes=16, method="hcms", subdomains=PARTS, tolerance=1e-4)
+    modes = modal_analysis(model, options, COMM)
+    expected = by_planes if COMM.size > 1 else by_parts
+    assert np.array_equal(modes.system.nodes, expected.nodes)
+    assert modes.evidence["subdomains"] == by_parts.decomposition.tree.parts
+    uncorrected = modal_analysis(model, replace(options, corrections=0), COMM)
+    assert np.array_equal(uncorrected.system.nodes, by_parts.nodes)
+
+    synthesis = synthesize(by_parts, 60, "free", COMM)
+    there = Redistribution(by_parts, by_planes, COMM).rows(synthesis.vectors)
+    back = Redistribution(by_planes, by_parts, COMM).rows(there)
+    assert np.array_equal(back, synthesis.vectors)
+    found, made = (
+        assemble(local_mesh, COMM).gather(vectors)
+        for local_mesh, vectors in ((by_planes, there), (by_parts, synthesis.vectors))
+    )
+    assert COMM.rank or np.array_equal(found, made)
+
+
+def a_synthesis_follows_materials_that_are_corrected_by_planes() -> None:
+    """A material of its own, the next one after it, and one from the modes of another."""
+    model = solids.random_box(9, 6, 5)
+    options = SolverOptions(modes=16, method="hcms", subdomains=PARTS, tolerance=1e-8)
+    following = ModalSolver(on_first(model), options, COMM)
+    modes = None
+    for factor, poisson, warm in ((1.0, None, 0), (2.0, None, 0), (3.0, 0.2, 0), (3.5, 0.2, 1)):
+        young = model.young.copy()
+        young[:20] *= factor
+        mine = young if COMM.rank == 0 else None
+        modes = following.solve(mine, modes if warm else None, poisson=poisson)
+        other = replace(model, poisson=poisson or model.poisson)
+        exact = solids.dense_eigenvalues(other.with_young(young))[6:16]
+        assert np.abs(modes.values[6:] / exact - 1.0).max() < 1e-8
+        assert ("hcms" in modes.evidence) == (not warm)
+
+
 def multigrid_is_the_same_bits_again() -> None:
     system = assemble(distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM), COMM)
     block = np.ones((len(system.rigid), 2))
@@ -561,6 +603,7 @@ def repetitions_give_the_same_bits() -> None:
         SolverOptions(modes=20, corrections=0),
         SolverOptions(modes=20, tolerance=1e-4, linear_solver="icc-pcg"),
         SolverOptions(modes=20, tolerance=1e-7),
+        SolverOptions(modes=20, tolerance=1e-7, method="hcms"),
     ):
         first, *others = (modal_analysis(model, options, COMM) for _ in range(REPETITIONS))
         for other in others:

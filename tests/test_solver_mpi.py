@@ -40,6 +40,15 @@ def test_painted_parts_give_the_bits_of_a_whole_synthesis(ranks, mpiexec):
     mpiexec(ranks, PROGRAM, "painted_parts_give_the_bits_of_a_whole_synthesis", check=True)
 
 
+@pytest.mark.parametrize("ranks", [*TO_THREE, 5])
+def test_a_synthesis_is_corrected_on_rows_cut_by_planes(ranks, mpiexec):
+    names = [
+        "corrections_of_a_synthesis_have_rows_cut_by_planes",
+        "a_synthesis_follows_materials_that_are_corrected_by_planes",
+    ]
+    mpiexec(ranks, PROGRAM, ",".join(names), check=True)
+
+
 @pytest.mark.parametrize("ranks", TO_THREE)
 def test_ranks_of_several_machines_solve_count_and_prove_as_those_of_one(ranks, mpiexec):
     names = [

@@ -98,13 +98,6 @@ def test_many_ranks_are_limited_by_the_fronts_that_they_share():
     assert factorisation(1e6, 1)[1].flops == 0.0
 
 
-def test_parts_of_subdomains_share_wider_fronts():
-    own, shared = factorisation(251_091, 4)
-    ragged, wider = factorisation(251_091, 4, planes=False)
-    assert ragged.flops > 1.5 * own.flops and wider.flops > 1.5 * shared.flops
-    assert factorisation(251_091, 1, planes=False) == factorisation(251_091, 1)
-
-
 def test_threads_of_a_rank_gain_less_than_ranks():
     assert thread_speed_up(1) == 1.0
     assert thread_speed_up(2) == pytest.approx(1.6)

@@ -52,12 +52,14 @@ class _Start:
 class CorrectedModes:
     """Corrected modes of one mesh, for any material on it.
 
+    HCMS has it `by_parts`, in subdomains; all else has the rows of `local_mesh`.
     `report` is called on each rank with the step and the largest estimated error.
     """
 
     def __init__(
         self,
         options: SolverOptions,
+        by_parts: LocalMesh,
         local_mesh: LocalMesh,
         linear: LinearSolver,
         comm: MPI.Comm,
@@ -71,7 +73,7 @@ class CorrectedModes:
         self._components: ComponentModes | None = None
         if options.method == "hcms":
             together = options.is_corrected and self._together
-            self._components = ComponentModes(local_mesh, options, together, comm)
+            self._components = ComponentModes(by_parts, local_mesh, options, together, comm)
 
     @property
     def _together(self) -> bool:
@@ -79,7 +81,7 @@ class CorrectedModes:
 
     def solve(
         self,
-        local_mesh: LocalMesh,
+        by_parts: LocalMesh,
         system: System,
         initial: Initial | None,
         same_mesh: bool,
@@ -87,7 +89,7 @@ class CorrectedModes:
         phases: Phases,
         evidence: dict[str, Any],
     ) -> Eigenpairs:
-        """Modes of a material; collective.
+        """Modes of a material, that of `system` and `by_parts`; collective.
 
         They start from `initial`, which may be modes that were found on this `same_mesh`.
         """
@@ -95,7 +97,7 @@ class CorrectedModes:
         tolerance = EIGENVALUE_TOLERANCE if tolerance is None else tolerance
         requested = options.modes - RIGID_MODES
         if options.check_inertia:
-            requested = min(requested + SPARE_MODES, local_mesh.n_dofs - RIGID_MODES)
+            requested = min(requested + SPARE_MODES, system.n_dofs - RIGID_MODES)
             # Said now, rather than once the modes are there, and lost.
             self._linear.tree.require_count(8 * requested * len(system.rigid))
         near = initial if isinstance(initial, Approximation) else None
@@ -104,7 +106,7 @@ class CorrectedModes:
                 start = self._from_nothing(system, requested, tolerance, law(), near)
         elif initial is None and self._components is not None:
             with phases("hcms"):
-                synthesis = self._components.synthesis(local_mesh, self._threads, evidence)
+                synthesis = self._components.synthesis(by_parts, self._threads, evidence)
             if options.corrections == 0:
                 return Eigenpairs(*lowest_pairs(synthesis, options.modes))
             values, vectors = elastic_part(system, synthesis)

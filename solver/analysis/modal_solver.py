@@ -17,6 +17,7 @@ from carillon.fem.moduli import require_coarse_moduli
 from carillon.processes.memory import reuse_freed_memory
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
+from solver.analysis.components import distribute_by_parts
 from solver.analysis.corrected import CorrectedModes, Eigenpairs
 from solver.analysis.faster_method import gradients_are_faster
 from solver.analysis.modes import Initial, Modes
@@ -88,16 +89,12 @@ class ModalSolver:
         if options.method not in RANDOM or options.linear_solver != "auto":
             prepared = None
         with phases("partition"):
-            if prepared is None:
-                self.local_mesh = distribute(
-                    model,
-                    options.subdomains,
-                    options.seed,
-                    comm,
-                    by_planes=options.method in RANDOM,
-                )
+            if prepared is not None:
+                self._by_parts = self.local_mesh = prepared.local_mesh
+            elif options.method in RANDOM:
+                self._by_parts = self.local_mesh = distribute(model, comm=comm, by_planes=True)
             else:
-                self.local_mesh = prepared.local_mesh
+                self._by_parts, self.local_mesh = distribute_by_parts(model, options, comm)
         with phases("analysis"):
             if prepared is None:
                 uncorrected = options.method == "hcms" and options.corrections == 0
@@ -119,7 +116,13 @@ class ModalSolver:
         linear = self._linear.by("amg-cg") if self._is_by_choice else self._linear
         report = _reporter(self._verbose and self.comm.rank == 0)
         self._corrected = CorrectedModes(
-            self.options, self.local_mesh, linear, self.comm, self._threads, report
+            self.options,
+            self._by_parts,
+            self.local_mesh,
+            linear,
+            self.comm,
+            self._threads,
+            report,
         )
 
     def solve(
@@ -151,14 +154,22 @@ class ModalSolver:
         """
         options, phases = self.options, Phases(self.comm, self._verbose, self._clock)
         with phases("assembly"):
-            local_mesh = self.local_mesh
-            if self.comm.bcast(young is not None):
+            moduli, changed = None, self.comm.bcast(young is not None)
+            if changed:
                 moduli = compute_on_root(
                     self.comm, lambda: self._moduli(cast(Array, young), coarsened)
                 )
-                local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
-            if poisson is not None:
-                local_mesh = with_poisson(local_mesh, poisson)
+
+            def of_material(local_mesh: LocalMesh) -> LocalMesh:
+                if changed:
+                    local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
+                return local_mesh if poisson is None else with_poisson(local_mesh, poisson)
+
+            by_parts, local_mesh = self._by_parts, of_material(self.local_mesh)
+            if self._by_parts is self.local_mesh:
+                by_parts = local_mesh
+            elif initial_modes is None:  # else there is no synthesis
+                by_parts = of_material(by_parts)
             similar = initial_modes if self._is_of_same_mesh(initial_modes) else None
             like = None if similar is None else similar.system
             elements = local_mesh.cells.elements
@@ -167,7 +178,7 @@ class ModalSolver:
             "method": options.method,
             "ranks": self.comm.size,
             "threads": self._threads,
-            "subdomains": local_mesh.decomposition.tree.parts,
+            "subdomains": by_parts.decomposition.tree.parts,
             "n_dofs": local_mesh.n_dofs,
         }
         if options.is_general:
@@ -176,13 +187,13 @@ class ModalSolver:
             law = partial(self._law, young)
             arguments = initial_modes, similar is not None, law, phases, evidence
             try:
-                pairs = self._corrected.solve(local_mesh, system, *arguments)
+                pairs = self._corrected.solve(by_parts, system, *arguments)
             except ConvergenceError as error:
                 if not (self._is_by_choice and error.collective):
                     raise
                 self._factorise_after(error)
                 evidence["method"] = self.options.method
-                pairs = self._corrected.solve(local_mesh, system, *arguments)
+                pairs = self._corrected.solve(by_parts, system, *arguments)
         exact = options.is_general or options.is_corrected
         residuals = prove(system, pairs.values, pairs.vectors, exact, phases, evidence)
         return Modes(

@@ -14,13 +14,13 @@ from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.processes.memory import reuse_freed_memory
 from solver.analysis.bounds import check_mode_count, default_keep
-from solver.analysis.components import elastic_part
+from solver.analysis.components import distribute_by_parts, elastic_part
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import Layout, System, assemble
 from solver.correction.criteria import default_guard
 from solver.correction.error_correction import correct
 from solver.distribution.collective import bcast_from_root
-from solver.distribution.local_mesh import distribute
+from solver.distribution.redistribution import Redistribution
 from solver.hcms.counts import Tally
 from solver.hcms.synthesis import make_subdomains, synthesize
 from solver.linear import Inverse, LinearSolver
@@ -49,6 +49,7 @@ def measure(
     """
     bcast_from_root(comm, lambda: check_mode_count(options.modes, cast(Solid, model).n_dofs))
     reuse_freed_memory()
+    options = replace(options, method="hcms")
     _Run(model, replace(options, modes=min(20, options.modes), tolerance=0.0, corrections=1), comm)
     runs = [_Run(model, options, comm) for _ in range(REPEATS)]
     seconds = comm.bcast([run.seconds for run in runs])
@@ -63,11 +64,11 @@ def measure(
         "repeats": REPEATS,
         "seconds": min(seconds),
         "slowest_seconds": max(seconds),
-        "n_dofs": run.local_mesh.n_dofs,
+        "n_dofs": run.by_parts.n_dofs,
         "modes": options.modes,
         "keep": run.keep,
         "width": run.width,
-        "subdomains": run.local_mesh.decomposition.tree.parts,
+        "subdomains": run.by_parts.decomposition.tree.parts,
         "corrections": run.result.steps,
         "blocks": run.result.blocks,
         "right_hand_sides": run.result.solves,
@@ -87,23 +88,25 @@ class _Run:
         self.width = requested + default_guard(requested)
         self.own = {name: Tally() for name in ("partition", "assembly", "dense")}
         with self._phase("partition"):
-            self.local_mesh = distribute(model, None, options.seed, comm)
-            parts = self.local_mesh.decomposition.tree.parts
+            self.by_parts, local_mesh = distribute_by_parts(model, options, comm)
+            parts = self.by_parts.decomposition.tree.parts
             self.keep = default_keep(options.modes, parts, together=True)
-            layout = Layout.of_local_mesh(self.local_mesh, comm)
-            subdomains = make_subdomains(self.local_mesh, options.interface, comm)
+            layout = Layout.of_local_mesh(local_mesh, comm)
+            subdomains = make_subdomains(self.by_parts, options.interface, comm)
+            redistribution = Redistribution(self.by_parts, local_mesh, comm)
             self.linear = _TimedLinearSolver(options.linear_solver, layout)
         comm.barrier()
         begin = time.perf_counter()
         with self._phase("assembly"):
-            system = assemble(self.local_mesh, comm, layout)
+            system = assemble(local_mesh, comm, layout)
         comm.barrier()
         threads = system.rows.threads
         synthesis = synthesize(
-            self.local_mesh, self.keep, options.interface, comm, subdomains, threads
+            self.by_parts, self.keep, options.interface, comm, subdomains, threads
         )
         self.counts = synthesis.counts
         with self._phase("dense"):
+            synthesis.vectors = redistribution.rows(synthesis.vectors)
             values, start = elastic_part(system, synthesis)
             self.result = correct(
                 system,

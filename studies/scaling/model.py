@@ -30,8 +30,6 @@ ASSUMPTIONS = (
     f"an eigenproblem shared by ranks takes {SHARED_COST:g} times as many operations, as on two "
     f"ranks here, evenly divided, and {SENT_A_COLUMN} messages a column and direction of the grid",
     *rank_scaling.ASSUMPTIONS,
-    "shared fronts are wider than where planes cut the solid, the more so the larger it is, since "
-    "the parts of ranks are made of subdomains",
     "a sum over the ranks takes log2(ranks) rounds of its whole payload",
     "corrections and right-hand sides are as many as were measured on the fewest ranks",
     "there are as many subdomains as ranks at least, which are then smaller",

@@ -58,18 +58,16 @@ def busiest(tree: MergeTree, nodes: Sequence[float], request: Request, ranks: in
     owner = assign_ranks(np.asarray(nodes[: tree.parts]) ** COST_EXPONENT, ranks)
     modes = planned_modes(tree, nodes, request.keep)
     steps = local_steps(tree.parts)
-    local, basis, own = np.zeros((3, ranks))
+    local, basis = np.zeros((2, ranks))
     for part, rank in enumerate(owner):
-        own[rank] += unknowns[part]
         local[rank] += krylov_flops(int(unknowns[part]), modes[part], steps)
         basis[rank] += product_flops(int(unknowns[part]), modes[part], modes[-1])
-    largest = float(own.max())
     return {
-        "assembly": Tally(flops=largest),
+        "assembly": Tally(flops=float(unknowns[-1]) / ranks),
         "local": Tally(flops=float(local.max())),
         **_synthesis(tree, nodes, modes, owner, request.keep, ranks),
         "basis": Tally(flops=float(basis.max()) if tree.merges else 0.0),
-        **_correction(float(unknowns[-1]), largest, request, ranks),
+        **_correction(float(unknowns[-1]), request, ranks),
     }
 
 
@@ -124,15 +122,15 @@ def _product_flops(nodes: Sequence[float], modes: list[int], step: Merge, root: 
     return projected + boundary * (left + right) * joined
 
 
-def _correction(unknowns: float, largest: float, request: Request, ranks: int) -> Work:
-    """Work of the block Lanczos iteration, where the busiest rank has `largest` of the unknowns."""
+def _correction(unknowns: float, request: Request, ranks: int) -> Work:
+    """Work of the block Lanczos iteration on rows that are cut by planes, equally many a rank."""
     blocks, columns = request.blocks, request.solves
-    own, shared = factorisation(unknowns, ranks, planes=False)
-    dense = products(largest, ranks, blocks, columns, request.width)
+    own, shared = factorisation(unknowns, ranks)
+    dense = products(unknowns / ranks, ranks, blocks, columns, request.width)
     alone = Share(DENSE_PROBLEM * float(columns) ** 3)
     return {
         "factor": _tally(own, shared),
-        "solve": _tally(solves(unknowns, ranks, blocks, columns, planes=False)),
+        "solve": _tally(solves(unknowns, ranks, blocks, columns)),
         "dense": _tally(dense, alone),
     }
 
