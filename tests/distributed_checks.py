@@ -490,6 +490,16 @@ def a_synthesis_follows_materials_that_are_corrected_by_planes() -> None:
         assert ("hcms" in modes.evidence) == (not warm)
 
 
+def corrections_of_a_synthesis_do_not_depend_on_ranks() -> None:
+    """They agree to rounding, however far from the modes they may end."""
+    model = solids.random_box(12, 7, 6)
+    for tolerance in (1e-2, 1e-4):
+        options = SolverOptions(modes=24, method="hcms", subdomains=PARTS, tolerance=tolerance)
+        alone = modal_analysis(model, options, MPI.COMM_SELF).values[6:]
+        values = modal_analysis(on_first(model), options, COMM).values[6:]
+        assert np.abs(values / alone - 1.0).max() < 1e-9
+
+
 def multigrid_is_the_same_bits_again() -> None:
     system = assemble(distribute(on_first(solids.random_box(9, 6, 5)), PARTS, comm=COMM), COMM)
     block = np.ones((len(system.rigid), 2))

@@ -44,6 +44,7 @@ def test_painted_parts_give_the_bits_of_a_whole_synthesis(ranks, mpiexec):
 def test_a_synthesis_is_corrected_on_rows_cut_by_planes(ranks, mpiexec):
     names = [
         "corrections_of_a_synthesis_have_rows_cut_by_planes",
+        "corrections_of_a_synthesis_do_not_depend_on_ranks",
         "a_synthesis_follows_materials_that_are_corrected_by_planes",
     ]
     mpiexec(ranks, PROGRAM, ",".join(names), check=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.fem.block import degrees_of_freedom
 from solver.assembly.system import System
 from solver.correction.krylov import KrylovBasis
 from solver.correction.shift import MOST
@@ -191,12 +192,13 @@ def _columns(requested: int) -> int:
 
 
 def _signs(system: System, modes: Array) -> Array:
-    """Signs (k,) that make each mode point along one fixed pattern over the rows.
+    """Signs (k,) that make each mode point along one fixed pattern over the nodes of the mesh.
 
     LAPACK finds a mode with either sign, as rounding has it, which differs with the number of
-    threads.  Another mixture would agree to the tolerance; the same one agrees to rounding.
+    threads.  Another mixture would agree to the tolerance; the same one agrees to rounding. Rows
+    differ with the number of ranks, nodes do not.
     """
-    pattern = np.cos(np.arange(3.0 * system.start, 3.0 * system.stop))
+    pattern = np.cos(degrees_of_freedom(system.nodes))
     along = system.inner(pattern[:, None], modes)[0]
     return np.where(along < 0.0, -1.0, 1.0)
 
