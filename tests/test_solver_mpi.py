@@ -40,7 +40,7 @@ def test_painted_parts_give_the_bits_of_a_whole_synthesis(ranks, mpiexec):
     mpiexec(ranks, PROGRAM, "painted_parts_give_the_bits_of_a_whole_synthesis", check=True)
 
 
-@pytest.mark.parametrize("ranks", [*TO_THREE, 5])
+@pytest.mark.parametrize("ranks", [*TO_THREE, pytest.param(5, marks=pytest.mark.nightly)])
 def test_a_synthesis_is_corrected_on_rows_cut_by_planes(ranks, mpiexec):
     names = [
         "corrections_of_a_synthesis_have_rows_cut_by_planes",
