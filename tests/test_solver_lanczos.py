@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from carillon.errors import ConvergenceError
+from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.model import fine_model
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
@@ -160,6 +161,21 @@ def test_one_step_follows_a_material_that_changes_smoothly():
     assert warm.evidence["corrections"] == 1 and warm.evidence["right_hand_sides"] == 30
     exact = solids.dense_eigenvalues(model.with_young(young))[6:36]
     assert np.abs(warm.values[6:] / exact - 1.0).max() <= 1e-4
+
+
+@pytest.mark.parametrize("method", ["lanczos", "hcms"])
+def test_modes_too_far_off_to_be_corrected_are_sought_anew(method, capfd):
+    """From a stiff core to a soft layer of a box: modes of many symmetries change their places."""
+    mesh = hexmesh_from_voxels(voxelize(builtin_surface("box"), 8))
+    place = np.abs(2.0 * mesh.grid / mesh.grid.max(axis=0) - 1.0)
+    core = np.where(place.max(axis=1) < 0.6, 1e11, 1e7)
+    layer = np.where(place[:, 0] < 0.5, 1e7, 1e11)
+    model = fine_model(mesh, core)
+    prepared = ModalSolver(model, SolverOptions(modes=20, tolerance=1e-9, method=method), COMM)
+    cold = prepared.solve(layer)
+    far = prepared.solve(layer, initial_modes=prepared.solve())
+    assert "modes are sought anew" in capfd.readouterr().err
+    np.testing.assert_allclose(far.values[6:], cold.values[6:], rtol=1e-8)
 
 
 @pytest.mark.parametrize(("change", "kept"), [(0.05, True), (0.4, False)])

@@ -19,6 +19,7 @@ from solver.coarsening.choice import make_coarsening
 from solver.correction.lanczos import mixed
 from solver.correction.lobpcg import lobpcg
 from solver.correction.shift import LEAST, MOST, inverse_amid
+from solver.correction.trial_space import TrialSpace
 from solver.distribution.local_mesh import distribute
 from solver.linear import LinearSolver, rank_tree
 from solver.linear.factorisation import count_negative
@@ -196,6 +197,18 @@ def test_a_count_that_no_memory_holds_is_refused_before_modes_are_sought(box, mo
 def test_options_of_other_methods_are_refused(box, given, complaint):
     with pytest.raises(UserError, match=complaint):
         ModalSolver(box.model, SolverOptions(modes=20, **given), COMM)
+
+
+def test_what_rounding_has_left_in_the_space_of_gradients_is_taken_out(box):
+    system = box.system
+    space = TrialSpace(system, start_block(system, 14, 0))
+    exact, off = space.values, np.eye(14) + 1e-6 * np.ones((14, 14))
+    space._block[:, :14] = (
+        space._block[:, :14] @ off
+    )  # as steps do where vectors are near dependent
+    vectors = space.vectors()
+    np.testing.assert_allclose(system.project_mass(vectors, vectors), np.eye(14), atol=1e-12)
+    np.testing.assert_allclose(space.values, exact, rtol=1e-12)
 
 
 @pytest.mark.parametrize("method", ["lanczos", "lobpcg", "hcms"])

@@ -189,10 +189,16 @@ class ModalSolver:
             try:
                 pairs = self._corrected.solve(by_parts, system, *arguments)
             except ConvergenceError as error:
-                if not (self._is_by_choice and error.collective):
+                if not error.collective or not (self._is_by_choice or initial_modes is not None):
                     raise
-                self._factorise_after(error)
-                evidence["method"] = self.options.method
+                if self._is_by_choice:
+                    self._factorise_after(error)
+                    evidence["method"] = self.options.method
+                else:
+                    self._say("the given modes are too far off; modes are sought anew")
+                    if by_parts is not local_mesh:
+                        by_parts = of_material(by_parts)
+                    arguments = None, False, law, phases, evidence
                 pairs = self._corrected.solve(by_parts, system, *arguments)
         exact = options.is_general or options.is_corrected
         residuals = prove(system, pairs.values, pairs.vectors, exact, phases, evidence)
@@ -209,9 +215,12 @@ class ModalSolver:
 
     def _factorise_after(self, error: ConvergenceError) -> None:
         """Go on with a factorisation where the choice of conjugate gradients was a bad one."""
-        say(f"{error}; a factorisation is made", visible=self.comm.rank == 0)
+        self._say(f"{error}; a factorisation is made")
         self._is_by_choice = False
         self._correct_by("lanczos", self.options)
+
+    def _say(self, sentence: str) -> None:
+        say(sentence, visible=self.comm.rank == 0)
 
     def _moduli(self, young: Array | None, coarsened: bool) -> Array:
         model, young = cast(Solid, self._model), cast(Array, young)

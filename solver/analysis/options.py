@@ -51,7 +51,7 @@ class SolverOptions:
     tolerance: ToleranceOrNone | None = option(
         None,
         "hcms, lanczos, lobpcg: relative eigenvalue error to correct to "
-        f"(default {EIGENVALUE_TOLERANCE:g}; 0 makes exactly --corrections steps); "
+        f"(default {EIGENVALUE_TOLERANCE:g}; with hcms 0 makes exactly --corrections steps); "
         f"slepc, arpack: residual tolerance (default {RESIDUAL_TOLERANCE:g})",
     )
     corrections: Corrections = option(

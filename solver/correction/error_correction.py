@@ -90,7 +90,8 @@ def correct(
         if result.errors.max() > tolerance > 0.0 and not keep:
             raise ConvergenceError(
                 f"conjugate gradients reached an eigenvalue error of {result.errors.max():.1e} "
-                f"after {result.steps} steps, {tolerance:.1e} was asked for; allow more steps"
+                f"after {result.steps} steps, {tolerance:.1e} was asked for; allow more steps "
+                "(--corrections), or use --method lanczos"
             )
         return result
     start = start() if callable(start) else start

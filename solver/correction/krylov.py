@@ -167,7 +167,7 @@ class KrylovBasis:
         values = values[:requested]
         size = np.maximum(values, ZERO_FRACTION * values[-1])
         error = square[:requested] / distance * (values - mu) ** 2 / size
-        error = error / PESSIMISM + ROUNDING * mu / size
+        error = error / PESSIMISM + ROUNDING * abs(mu) / size
         if below < self._inverse.negative - self._rigid:
             error = np.maximum(error, 1.0)
         return error, float(values[requested - 1])

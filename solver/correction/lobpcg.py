@@ -89,6 +89,11 @@ def lobpcg(
         active = active[moving]
         basis.step(moving, active)
     vectors = basis.vectors()
+    if vectors.shape[1] < requested:
+        raise ConvergenceError(
+            f"{vectors.shape[1]} of {requested} modes are left after {step} steps, others became "
+            "linearly dependent; use --method auto"
+        )
     return Correction(
         basis.values[:requested],
         np.ascontiguousarray(vectors[:, :requested]),

@@ -14,7 +14,7 @@ from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System
 from solver.distribution.collective import bcast_from_root
 from solver.subspace.orthonormal import orthonormal
-from solver.subspace.rayleigh_ritz import reduced_eigenpairs, ritz_weights
+from solver.subspace.rayleigh_ritz import ORTHONORMAL, reduced_eigenpairs, ritz_weights
 
 ROWS_AT_ONCE = 2048
 """Number of rows of the basis that are multiplied together and written back."""
@@ -53,8 +53,17 @@ class TrialSpace:
         return values
 
     def vectors(self) -> Array:
-        """X (local, m), for which the space is given up: its block shrinks to these columns."""
-        block, width = self._block, self._width
+        """X (local, m), for which the space is given up: its block shrinks to these columns.
+
+        What rounding has left of many steps in their Gram matrix is taken out first; fewer columns
+        may be left where some became dependent.
+        """
+        block = self._block
+        own = block[:, : self._width]
+        deviation = np.abs(self._system.project_mass(own, own) - np.eye(self._width)).max()
+        if deviation > ORTHONORMAL:
+            self.values = self._ritz_values()
+        width = self._width
         rows = len(block)
         flat = block.reshape(-1)
         for first in range(0, rows, ROWS_AT_ONCE):
