@@ -125,8 +125,8 @@ class RankTree:
 
         This rank will hold so many more bytes `beside` it than now.
         """
-        give_back_freed_memory()
         needed = sum_over_machine(self.comm, self.bytes_of_count + beside)
+        self._make_room(needed)
 
         def check() -> None:
             free = available_memory()
@@ -139,13 +139,23 @@ class RankTree:
 
         on_every_rank(self.comm, check)
 
+    def _make_room(self, needed: int) -> None:
+        """Give back freed memory on every rank where a machine has less than it needs; collective.
+
+        Only then, since memory that is given back takes time to come by again.
+        """
+        free = available_memory()
+        if self.comm.allreduce(free is not None and needed > free, MPI.LOR):
+            give_back_freed_memory()
+            self.comm.Barrier()
+
     def _require_memory(self, own: int) -> None:
         """Refuse on every rank what takes more memory than one of the machines has.
 
         Each rank passes what it needs of its machine's.
         """
-        give_back_freed_memory()
         needed = sum_over_machine(self.comm, own)
+        self._make_room(needed)
         on_every_rank(self.comm, lambda: require_memory(self._unknowns, needed))
 
     def inverse(
