@@ -1,22 +1,26 @@
-"""What the solver's commands share: ranks and threads, PETSc's errors, outputs and their origin."""
+"""What the solver's commands share: ranks, PETSc's errors, a measurement, outputs and origin."""
 
 import argparse
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
 from carillon.command_line import outputs
+from carillon.fem.model import Solid
 from carillon.files.atomic import atomic_path
-from carillon.parameters.command_line import add_options
+from carillon.parameters.command_line import add_options, collect
 from carillon.processes.blas import warn_about_reference_blas
 from carillon.processes.petsc import PETSc
 from carillon.records.measurement import measured
-from solver.analysis.problem import ProblemOptions
+from solver.analysis.problem import ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, share_cores
 from solver.linear import petsc_options
+
+Options = TypeVar("Options")
+"""Options of a command."""
 
 INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
 """Arguments that name input files of a command."""
@@ -80,6 +84,24 @@ def tell_measured(
     result["provenance"] = measured(parameters(arguments))
     write_json(arguments, result, comm)
     print(json.dumps(result, indent=2) if arguments.json else as_text(result))
+
+
+def measure_solid(
+    arguments: argparse.Namespace,
+    options: type[Options],
+    measure: Callable[[Solid, Options, int], dict[str, Any]],
+    as_lines: Callable[[dict[str, Any]], list[str]],
+) -> None:
+    """Run a command that measures a solid: build it, `measure`, write and print; collective.
+
+    `measure` gets the solid, the command's own options and the seed.
+    """
+    with on_ranks() as comm:
+        require_outputs(arguments, comm)
+        described = collect(ProblemOptions, arguments)
+        model = build_problem(described).model
+        result = measure(model, collect(options, arguments), described.seed)
+        tell_measured(arguments, result, lambda found: "\n".join(as_lines(found)), comm)
 
 
 def write_json(

@@ -2,9 +2,8 @@
 
 import argparse
 
-from carillon.parameters.command_line import add_options, collect
-from solver.analysis.problem import ProblemOptions, build_problem
-from solver.commands.running import add_outputs, add_solid, on_ranks, require_outputs, tell_measured
+from carillon.parameters.command_line import add_options
+from solver.commands.running import add_outputs, add_solid, measure_solid
 from studies.benchmark.direct import DirectOptions, compare, table_lines
 
 EXAMPLES = """examples:
@@ -22,9 +21,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Measure and print."""
-    with on_ranks() as comm:
-        require_outputs(arguments, comm)
-        described = collect(ProblemOptions, arguments)
-        model = build_problem(described).model
-        result = compare(model, collect(DirectOptions, arguments), described.seed)
-        tell_measured(arguments, result, lambda found: "\n".join(table_lines(found)), comm)
+    measure_solid(arguments, DirectOptions, compare, table_lines)
