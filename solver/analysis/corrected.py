@@ -81,7 +81,7 @@ class CorrectedModes:
 
     def solve(
         self,
-        by_parts: LocalMesh,
+        by_parts: Callable[[], LocalMesh],
         system: System,
         initial: Initial | None,
         same_mesh: bool,
@@ -89,7 +89,7 @@ class CorrectedModes:
         phases: Phases,
         evidence: dict[str, Any],
     ) -> Eigenpairs:
-        """Modes of a material, that of `system` and `by_parts`; collective.
+        """Modes of the material of `system`, which `by_parts` gives to subdomains; collective.
 
         They start from `initial`, which may be modes that were found on this `same_mesh`.
         """
@@ -106,7 +106,7 @@ class CorrectedModes:
                 start = self._from_nothing(system, requested, tolerance, law(), near)
         elif initial is None and self._components is not None:
             with phases("hcms"):
-                synthesis = self._components.synthesis(by_parts, self._threads, evidence)
+                synthesis = self._components.synthesis(by_parts(), self._threads, evidence)
             if options.corrections == 0:
                 return Eigenpairs(*lowest_pairs(synthesis, options.modes))
             values, vectors = elastic_part(system, synthesis)

@@ -165,11 +165,12 @@ class ModalSolver:
                     local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
                 return local_mesh if poisson is None else with_poisson(local_mesh, poisson)
 
-            by_parts, local_mesh = self._by_parts, of_material(self.local_mesh)
-            if self._by_parts is self.local_mesh:
-                by_parts = local_mesh
-            elif initial_modes is None:  # else there is no synthesis
-                by_parts = of_material(by_parts)
+            local_mesh = of_material(self.local_mesh)
+
+            def by_parts() -> LocalMesh:
+                same = self._by_parts is self.local_mesh
+                return local_mesh if same else of_material(self._by_parts)
+
             similar = initial_modes if self._is_of_same_mesh(initial_modes) else None
             like = None if similar is None else similar.system
             elements = local_mesh.cells.elements
@@ -178,7 +179,7 @@ class ModalSolver:
             "method": options.method,
             "ranks": self.comm.size,
             "threads": self._threads,
-            "subdomains": by_parts.decomposition.tree.parts,
+            "subdomains": self._by_parts.decomposition.tree.parts,
             "n_dofs": local_mesh.n_dofs,
         }
         if options.is_general:
@@ -196,8 +197,6 @@ class ModalSolver:
                     evidence["method"] = self.options.method
                 else:
                     self._say("the given modes are too far off; modes are sought anew")
-                    if by_parts is not local_mesh:
-                        by_parts = of_material(by_parts)
                     arguments = None, False, law, phases, evidence
                 pairs = self._corrected.solve(by_parts, system, *arguments)
         exact = options.is_general or options.is_corrected
