@@ -98,7 +98,7 @@ def _runs(near: NDArray[np.uint32], diagonal: Array, count: int) -> tuple[Index,
 
 @numba.njit(inline="always")
 def _slices(near, length, vector):  # type: ignore[no-untyped-def]
-    """Those of a run's neighbours."""
+    """Values (length,) at the six neighbours of a run's cells, zeros where there is none."""
     return (
         vector[near[0] : near[0] + length],
         vector[near[1] : near[1] + length],

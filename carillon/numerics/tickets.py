@@ -40,7 +40,7 @@ def increase(context: Any, counters: Any, number: Any) -> Any:
 
 @intrinsic
 def count(context: Any, counters: Any, number: Any) -> Any:
-    """What a counter is: what other threads wrote before they increased it can be read then."""
+    """Value of a counter, after which all can be read that was written before it was increased."""
 
     def emit(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = _address(context, builder, signature.args[0], *arguments)

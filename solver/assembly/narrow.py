@@ -26,7 +26,10 @@ def ranges(rows: int, threads: int, grain: int) -> list[tuple[int, int]]:
 
 
 def as_lanes(vectors: Array) -> tuple[Array, int]:
-    """The same rows as a block of lanes, a view if they fill the registers; registers to a row."""
+    """Vectors (n, k) as a block of lanes, and the number of registers to a row.
+
+    The block is a view if the columns fill the registers.
+    """
     rows, columns = vectors.shape
     lanes = lanes_of(columns)
     if columns == lanes * LANES and vectors.flags.c_contiguous:

@@ -116,7 +116,7 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
 
 
 def _counted(attributes: dict[str, Any], hertz: Array) -> str:
-    """What the count of eigenvalues says of the modes."""
+    """Sentence on how many eigenvalues were counted, found and written."""
     below = float(frequencies(np.array([attributes["inertia_at"]]))[0])
     count = attributes["inertia_count"]
     return (

@@ -38,7 +38,7 @@ class Crew:
         return first
 
     def _by_all(self, kind: int, factors: Sequence[Factors]) -> list[list[Array]]:
-        """What this rank and each of the others make of their rows; one message each way."""
+        """Products of the rows of this rank and of each helper, with one message each way."""
         if not factors:
             return [[]]
         cuts = [row_slices(len(first), 1 + len(self.helpers)) for first, _ in factors]

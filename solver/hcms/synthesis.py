@@ -215,7 +215,10 @@ class _Climb:
         return values, weights
 
     def _coefficients(self, step: Merge, above: Array | None) -> dict[int, Array]:
-        """Those of the whole's modes in the children's, from those in the group's own `above`."""
+        """Coefficients of the final modes in those of each child, by its number.
+
+        `above` (k, modes) are the coefficients in the group's own modes; None if it is the whole.
+        """
         sides = dict(zip((step.left, step.right), self.ascent.coefficients.pop(step.group)))
         if above is None:
             return sides

@@ -164,7 +164,7 @@ def inverse_of(block: Array) -> tuple[Array, int]:
 def _update_strip(
     own: Array, inverses: list[Array], coupling: Array | None, update: Array, first: int
 ) -> None:
-    """What the elimination of the own rows takes off a strip of the rows beyond.
+    """Fill a strip of a front's update: what eliminating its own rows takes off the rows beyond.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def _row(packed, size, row):  # type: ignore[no-untyped-def]
 
 @compiled
 def _subtract_from_own(own, first, stop, places, update):  # type: ignore[no-untyped-def]
-    """What a child leaves of the rows of the nodes from `first` to `stop`."""
+    """Subtract a child's update from the own rows of the nodes from `first` to `stop`."""
     size = 3 * len(places)
     for a in range(np.searchsorted(places, first), np.searchsorted(places, stop)):
         for i in range(3):
@@ -243,7 +243,7 @@ def _subtract_from_own(own, first, stop, places, update):  # type: ignore[no-unt
 
 @compiled
 def _add_beyond(total, total_size, first, count, places, update):  # type: ignore[no-untyped-def]
-    """What a child leaves of the rows beyond in the strip from the node `first` on."""
+    """Add a child's update to the strip of rows beyond that begins with the node `first`."""
     size, stop = 3 * len(places), count + first + STRIP // 3
     for a in range(np.searchsorted(places, count + first), np.searchsorted(places, stop)):
         for i in range(3):
