@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +24,16 @@ from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, load_surface, surface_name, voxelize
 from carillon.fem.geometry.surface import surface_of_triangles
-from carillon.fem.model import DEFAULT_DENSITY, Constants, Damping, Solid, fine_model
+from carillon.fem.model import (
+    DEFAULT_DENSITY,
+    Constants,
+    Damping,
+    ElasticModel,
+    Solid,
+    fine_model,
+)
 from carillon.fem.moduli import require_moduli
+from carillon.fem.regions import Regions
 from carillon.parameters import Check, checked, parameters
 from carillon.parameters.quantities import (
     Count,
@@ -167,10 +175,15 @@ class Material:
 
         Raises UserError if there is none of that name.
         """
-        from sound.scenes.materials import named_material
+        from carillon.composition.materials import named_material
 
         row = named_material(name)
         return cls(row.young, row.poisson, row.density, (row.alpha, row.beta))
+
+    def regions(self) -> Regions:
+        """The material as the only one of a solid."""
+        young = self.young if isinstance(self.young, int | float) else 1e9
+        return Regions.one(self.poisson, self.density, float(young), self.damping)
 
     def moduli(self, mesh: HexMesh) -> Array:
         """Young's modulus (m,), or (m, 8) if given so, of the voxels of a mesh [Pa].
@@ -190,7 +203,7 @@ class Material:
 
 def _require_no_material(young: str) -> None:
     """Say how a material such as brass is given, where its name stands in place of a modulus."""
-    from sound.scenes.materials import MATERIALS
+    from carillon.composition.materials import MATERIALS
 
     if young in MATERIALS and not Path(young).exists():
         raise UserError(
@@ -393,14 +406,11 @@ def coarsen(
 
     fine = _solid(body, material, resolution, "voxel")
     file = forests.path if isinstance(forests, Forests) else forests
-    coarsening = make_coarsening(method, fine.poisson, file)
+    coarsening = make_coarsening(method, cast(float, fine.poisson), file)
     young = fine.young[:, 0] if fine.young.ndim > 1 else fine.young
-    constants: Constants = {
-        "poisson": fine.poisson,
-        "density": fine.density,
-        "damping": fine.damping,
-    }
-    return build_model(fine.mesh, young, coarsening, **constants)
+    region = fine.cell_regions if isinstance(fine, ElasticModel) else None
+    constants: Constants = {"regions": fine.regions, "supports": fine.supports}
+    return build_model(fine.mesh, young, coarsening, region=region, **constants)
 
 
 def read(path: str | Path) -> Solution | Design:
@@ -801,7 +811,7 @@ def _solid(body: Body, given: Given, resolution: int, discretisation: str) -> So
     else:
         mesh = body if isinstance(body, Mesh) else load_mesh(body)
         solid = _meshed(mesh, made, resolution, discretisation)
-    return solid.with_constants(made.poisson, made.density, made.damping)
+    return solid.with_regions(made.regions())
 
 
 def _meshed(mesh: Mesh, material: Material, resolution: int, discretisation: str) -> Solid:

@@ -24,6 +24,7 @@ from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.geometry.hanging import WHOLE
 from carillon.fem.model import ElasticModel, Solid
+from carillon.fem.regions import Regions
 from solver.analysis.modal_solver import ModalSolver, modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
@@ -484,7 +485,7 @@ def a_synthesis_follows_materials_that_are_corrected_by_planes() -> None:
         young[:20] *= factor
         mine = young if COMM.rank == 0 else None
         modes = following.solve(mine, modes if warm else None, poisson=poisson)
-        other = replace(model, poisson=poisson or model.poisson)
+        other = model.with_regions(Regions.one(poisson or model.poisson))
         exact = solids.dense_eigenvalues(other.with_young(young))[6:16]
         assert np.abs(modes.values[6:] / exact - 1.0).max() < 1e-8
         assert ("hcms" in modes.evidence) == (not warm)

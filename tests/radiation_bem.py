@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.model import RIGID_MODES, fine_model
+from carillon.fem.regions import Regions
 from solver.analysis.library import solve
 from solver.response.points import interpolation
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, radiated
@@ -91,7 +92,7 @@ def vibrating_solid(name: str, triangles: int = TRIANGLES) -> VibratingSurface:
 
     mesh = hexmesh_from_voxels(voxelize(builtin_surface(name), RESOLUTION))
     young, poisson, density = MATERIALS.get(name, STEEL)
-    model = fine_model(mesh, np.full(mesh.n_cells, young), poisson=poisson, density=density)
+    model = fine_model(mesh, np.full(mesh.n_cells, young), regions=Regions.one(poisson, density))
     solution = solve(model, modes=MODES)
     fine = struck_surface(f"builtin:{name}")
     fine.merge_vertices()

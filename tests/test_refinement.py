@@ -26,6 +26,7 @@ from carillon.fem.geometry import (
 from carillon.fem.geometry.faces import boundary_faces, corner_values, face_neighbours
 from carillon.fem.geometry.hanging import makes_sense, node_places, node_weights
 from carillon.fem.laplacian import cell_laplacian
+from carillon.fem.regions import Regions
 from solver.assembly.sparse import assembled
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
@@ -202,7 +203,7 @@ def test_mixed_galerkin_matrices_are_projections_of_the_fine_ones(seed):
 def test_patch_of_constant_strain(seed):
     fine, refined, blocks = random_blocks(seed)
     young = np.full(fine.n_cells, 2e9)
-    model = build_model(fine, young, make_coarsening("galerkin"), refined, poisson=0.3)
+    model = build_model(fine, young, make_coarsening("galerkin"), refined, regions=Regions.one(0.3))
     K, M = assembled(model)
     nodes = blocks.coarse.nodes
     rigid = rigid_motions(nodes, nodes.mean(axis=0))
@@ -244,7 +245,7 @@ def test_relaxed_elements_with_hanging_corners_are_free(interface):
     kinds = kinds[np.random.default_rng(0).permutation(len(kinds))[:60]].astype(np.int32)
     young = np.random.default_rng(1).uniform(0.1, 10.0, (len(kinds), 8))
     fill = np.full(len(kinds), 255, dtype=np.uint8)
-    elements = HexElements(young, fill, 1.0, 0.25, 1.0, False, 0.0, kinds)
+    elements = HexElements(young, fill, 1.0, Regions.one(0.25, 1.0), False, 0.0, kinds)
     stiffness, places = elements.stiffness(), elements.node_places.astype(float)
     for corners in combinations(range(8), 3):
         inside = np.broadcast_to(np.isin(np.arange(8), corners), (len(kinds), 8))

@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 import pytest
 
+from carillon.composition.materials import MATERIALS, named_material
 from carillon.errors import UserError
 from carillon.limits import require_constants
-from sound.scenes.materials import MATERIALS, named_material
 
 LOCKING = 0.45
 """Poisson's ratio above which trilinear elements are too stiff to be of use."""

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from carillon.errors import UserError
 from carillon.fem.geometry import hexmesh_from_grid, load_surface, voxelize
 from carillon.fem.model import fine_model
+from carillon.fem.regions import Regions
 from carillon.processes.petsc import PETSc
 from solver.analysis import bounds
 from solver.analysis.modal_solver import ModalSolver
@@ -151,7 +152,9 @@ def test_solids_at_the_limits_are_solved_as_others_are(unit, density, young):
 
     def frequencies(edge, young, density):
         cells = hexmesh_from_grid(grid, np.zeros(3), edge)
-        model = fine_model(cells, np.full(cells.n_cells, young), density=density)
+        model = fine_model(
+            cells, np.full(cells.n_cells, young), regions=Regions.one(density=density)
+        )
         return np.sqrt(solids.analysed(model, modes=12, method="slepc").values[6:])
 
     scale = np.sqrt(young / density) / unit

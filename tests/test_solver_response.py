@@ -8,6 +8,7 @@ import pytest
 import scipy.linalg as la
 
 from carillon.errors import UserError
+from carillon.fem.embedding import embedding
 from carillon.fem.geometry import blocks_from_mesh, hexmesh_from_grid, prolongation
 from carillon.fem.model import RIGID_MODES, ElasticModel, fine_model
 from solver.__main__ import main
@@ -15,7 +16,7 @@ from solver.assembly.sparse import assembled
 from solver.coarsening.model import coarse_model
 from solver.files.modes_file import ModesFile, frequencies, read_modes, write_modes
 from solver.response.contact import Contact, choose_contacts
-from solver.response.points import embedding, interpolation
+from solver.response.points import interpolation
 from solver.response.response import (
     SAMPLE_RATE_HERTZ,
     Contacts,

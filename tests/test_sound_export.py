@@ -11,6 +11,7 @@ import trimesh
 
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import fine_model, mass_properties
+from carillon.fem.regions import Regions
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes
@@ -152,7 +153,7 @@ def test_the_loudest_modes_come_first(folder):
 def test_mass_properties_of_a_box():
     a, b, c = SIDES
     properties = mass_properties(
-        fine_model(box_mesh(6, 4, 2, 0.04), np.full(48, 1e9), density=500.0)
+        fine_model(box_mesh(6, 4, 2, 0.04), np.full(48, 1e9), regions=Regions.one(density=500.0))
     )
     mass = 500.0 * a * b * c
     assert properties.mass == pytest.approx(mass)

@@ -9,15 +9,13 @@ from functools import cache, lru_cache
 import numpy as np
 
 from carillon.arrays import Array, Index, frozen
+from carillon.fem.elasticity import DEFAULT_POISSON, SHEARS, Elasticity, elasticity_matrix
 
 CORNERS: Index = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])
 """(8, 3) offsets of the corners, in bit order."""
 
-DEFAULT_POISSON = 0.25
-"""Poisson's ratio of all experiments in the paper (section 8.1)."""
-
 KEPT = 8
-"""Poisson's ratios whose matrices are kept; searches may go through thousands."""
+"""Elasticities whose matrices are kept; searches may go through thousands."""
 
 GAUSS_POINTS: Array = 0.5 + (CORNERS - 0.5) / np.sqrt(3.0)
 """(8, 3) points of the 2x2x2 Gauss rule on the unit cube; each has weight 1/8."""
@@ -42,17 +40,9 @@ def _factors(points: Array) -> Array:
     return np.where(CORNERS[None] == 1, points[:, None], 1.0 - points[:, None])
 
 
-def elasticity_matrix(poisson: float = DEFAULT_POISSON) -> Array:
-    """Isotropic elasticity matrix (6, 6) for Young's modulus 1; engineering shear strains."""
-    if not -1.0 < poisson < 0.5:
-        raise ValueError(f"Poisson's ratio {poisson} is outside (-1, 0.5)")
-    lame = poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
-    shear = 0.5 / (1.0 + poisson)
-    matrix = np.zeros((6, 6))
-    matrix[:3, :3] = lame
-    matrix[np.arange(3), np.arange(3)] += 2.0 * shear
-    matrix[np.arange(3, 6), np.arange(3, 6)] = shear
-    return matrix
+def matrix_of(law: float | Elasticity) -> Array:
+    """Elasticity matrix (6, 6) for modulus 1 of a Poisson's ratio, or of any other elasticity."""
+    return law.matrix if isinstance(law, Elasticity) else elasticity_matrix(law)
 
 
 def strain_displacement(gradients: Array) -> Array:
@@ -60,17 +50,18 @@ def strain_displacement(gradients: Array) -> Array:
     matrices = np.zeros((len(gradients), 6, gradients.shape[1], 3))
     for axis in range(3):
         matrices[:, axis, :, axis] = gradients[:, :, axis]
-    for row, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), start=3):
+    for row, (a, b) in enumerate(SHEARS, start=3):
         matrices[:, row, :, a] = gradients[:, :, b]
         matrices[:, row, :, b] = gradients[:, :, a]
     return matrices.reshape(len(gradients), 6, -1)
 
 
 @lru_cache(KEPT)
-def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
+def quadrature_stiffness(law: float | Elasticity = DEFAULT_POISSON) -> Array:
     """Stiffness contributions K_q (8, 24, 24) of the quadrature points for unit edge and modulus.
 
-    An element of edge h with moduli E_q has the stiffness `h * sum_q E_q K_q`.
+    An element of edge h with moduli E_q has the stiffness `h * sum_q E_q K_q`. `law` is Poisson's
+    ratio, or another elasticity.
 
     Examples
     --------
@@ -82,15 +73,26 @@ def quadrature_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
     True
     """
     strain = strain_displacement(shape_gradients(GAUSS_POINTS))
-    elasticity = elasticity_matrix(poisson)
+    elasticity = matrix_of(law)
     matrices = np.einsum("qia,ij,qjb->qab", strain, elasticity, strain, optimize=True) / 8.0
     return frozen(0.5 * (matrices + matrices.transpose(0, 2, 1)))
 
 
 @lru_cache(KEPT)
-def uniform_stiffness(poisson: float = DEFAULT_POISSON) -> Array:
+def uniform_stiffness(law: float | Elasticity = DEFAULT_POISSON) -> Array:
     """Stiffness (24, 24) of the element with uniform unit modulus and unit edge."""
-    return frozen(quadrature_stiffness(poisson).sum(axis=0))
+    return frozen(quadrature_stiffness(law).sum(axis=0))
+
+
+@cache
+def elasticity_stiffness() -> Array:
+    """Stiffness (8 * 36, 24 * 24) by the points' elasticity matrices, for unit edge.
+
+    An element of edge h with matrices C_q [Pa] has the stiffness `h * C.ravel() @` this.
+    """
+    strain = strain_displacement(shape_gradients(GAUSS_POINTS))
+    products = np.einsum("qia,qjb->qijab", strain, strain) / 8.0
+    return frozen(products.reshape(8 * 36, 24 * 24))
 
 
 @cache

@@ -2,27 +2,45 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Self, cast
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import ALL_FILLED, coarse_cell_mass
-from carillon.fem.element import CORNERS, quadrature_stiffness
+from carillon.fem.element import (
+    CORNERS,
+    elasticity_stiffness,
+    quadrature_stiffness,
+    shape_functions,
+)
 from carillon.fem.geometry.hanging import WHOLE, node_places, node_weights
+from carillon.fem.regions import RegionOf, Regions
+from carillon.fem.supports import Attached
 
 Chosen = NDArray[np.integer] | Flags | slice
+
+MOST_LAWS = 16
+"""Most elasticities whose kernels are put side by side; of more, matrices are summed by entries."""
 
 
 class Elements(ABC):
     """Elements of one kind, all of whose arrays have a row for each."""
 
     young: Array
-    """(c, p) moduli [Pa] at the points of each element, which its stiffness is linear in."""
+    """Moduli [Pa] at the points of each element, which its stiffness is linear in."""
     edge: float
     """Spacing of the lattice that the nodes lie on [m]."""
-    poisson: float
+    regions: Regions
+    """Materials that there are."""
+    support: NDArray[np.int32] | None
+    """(c,) numbers of the elements in `attached`, -1 of those without supports; None of a free
+    solid."""
+    attached: Attached | None
+    """What supports the solid, in all of its elements."""
+    ROWS: ClassVar[tuple[str, ...]]
+    """Names of the arrays with a row for each element, some of which may be None."""
 
     @property
     @abstractmethod
@@ -44,21 +62,43 @@ class Elements(ABC):
     def sort_key(self) -> NDArray[np.integer]:
         """What (c,) tells elements with the same nodes apart."""
 
-    @abstractmethod
     def arrays(self) -> list[NDArray[Any]]:
         """What differs from element to element: the arguments of `of`."""
+        return [getattr(self, name) for name in self._rows()]
 
-    @abstractmethod
     def of(self, *arrays: NDArray[Any]) -> Self:
         """Other elements of the same solid."""
+        changed: dict[str, Any] = dict(zip(self._rows(), arrays, strict=True))
+        return replace(cast(Any, self), **changed)  # Every kind is a dataclass.
 
-    @abstractmethod
+    def _rows(self) -> list[str]:
+        return [name for name in self.ROWS if getattr(self, name) is not None]
+
     def stiffness(self, chosen: Chosen = slice(None)) -> Array:
         """Element stiffness matrices (c, 3 k, 3 k) [N/m] of the chosen elements."""
+        matrices = self._stiffness(chosen)
+        if self.attached is not None and self.support is not None:
+            self.attached.add_stiffness(self.support[chosen], matrices)
+        return matrices
 
-    @abstractmethod
     def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
         """Element masses (c, k, k) [kg] between nodes, the same for each component."""
+        matrices = self._nodal_mass(chosen)
+        if self.attached is not None and self.support is not None:
+            self.attached.add_mass(self.support[chosen], matrices)
+        return matrices
+
+    @abstractmethod
+    def _stiffness(self, chosen: Chosen) -> Array:
+        """Stiffness without supports."""
+
+    @abstractmethod
+    def _nodal_mass(self, chosen: Chosen) -> Array:
+        """Mass without supports."""
+
+    @abstractmethod
+    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
+        """Weights (p, k) of the nodes of `elements` (p,) at places (p, 3) in them, from 0 to 1."""
 
     def with_young(self, young: Array) -> Self:
         """The same elements with other moduli."""
@@ -66,7 +106,7 @@ class Elements(ABC):
 
     def with_poisson(self, poisson: float) -> Self:
         """The same elements with another Poisson's ratio."""
-        return replace(cast(Any, self), poisson=poisson)  # Every kind is a dataclass.
+        return replace(cast(Any, self), regions=self.regions.with_poisson(poisson))
 
     def __len__(self) -> int:
         return len(self.young)
@@ -76,25 +116,23 @@ class Elements(ABC):
 class HexElements(Elements):
     """Cubic elements with material, wherever their nodes may be; see `ElasticModel`."""
 
+    ROWS = ("young", "fill", "kinds", "region", "support")
+
     young: Array
+    """(c, 8) at the quadrature points."""
     fill: NDArray[np.uint8]
     edge: float
     """Edge of an element [m], of the smaller ones in a mixed mesh."""
-    poisson: float
-    density: float
-    lumped: bool
-    lumped_share: float
+    regions: Regions
+    lumped: bool = False
+    lumped_share: float = 0.0
     kinds: NDArray[np.int32] | None = None
     """(c,) int32: kinds of the elements of a mixed mesh, see `carillon.fem.geometry.hanging`; else
     None."""
-
-    def of(self, *arrays: NDArray[Any]) -> Self:
-        young, fill, *kinds = arrays
-        return replace(self, young=young, fill=fill, kinds=kinds[0] if kinds else None)
-
-    def arrays(self) -> list[NDArray[Any]]:
-        kinds = [] if self.kinds is None else [self.kinds]
-        return [self.young, self.fill, *kinds]
+    region: RegionOf | None = None
+    """(c, 8) region of each octant and of the point in it; None if there is one."""
+    support: NDArray[np.int32] | None = None
+    attached: Attached | None = None
 
     @property
     def steps(self) -> int:
@@ -114,9 +152,15 @@ class HexElements(Elements):
     def sort_key(self) -> NDArray[np.uint8]:
         return self.fill
 
-    def stiffness(self, chosen: Chosen = slice(None)) -> Array:
-        kernels = quadrature_stiffness(self.poisson).reshape(8, 576)
-        stiffness = (self.edge * (self.young[chosen] @ kernels)).reshape(-1, 24, 24)
+    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
+        """Trilinear weights (p, 8); what a hanging corner says is the nodes' that it hangs from."""
+        weights = shape_functions(places)
+        if self.kinds is None:
+            return weights
+        return np.einsum("pk,pkj->pj", weights, node_weights()[self.kinds[elements]])
+
+    def _stiffness(self, chosen: Chosen) -> Array:
+        stiffness = self._uniform_edges(chosen)
         if self.kinds is None:
             return stiffness
         kinds = self.kinds[chosen]
@@ -127,7 +171,25 @@ class HexElements(Elements):
             stiffness[hangs] = weights.transpose(0, 2, 1) @ stiffness[hangs] @ weights
         return stiffness
 
-    def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
+    def _uniform_edges(self, chosen: Chosen) -> Array:
+        """Stiffness (c, 24, 24) as if all elements had the smaller edge."""
+        young, laws = self.young[chosen], self.regions.laws
+        if self.region is None:
+            kernels = quadrature_stiffness(laws[0]).reshape(8, 576)
+            return (self.edge * (young @ kernels)).reshape(-1, 24, 24)
+        present, law = np.unique(self.region[chosen], return_inverse=True)
+        law = law.reshape(young.shape)
+        if len(present) > MOST_LAWS:
+            entries = young[:, :, None, None] * self.regions.elasticity[present][law]
+            summed = entries.reshape(len(young), -1) @ elasticity_stiffness()
+            return (self.edge * summed).reshape(-1, 24, 24)
+        kernels = np.concatenate([quadrature_stiffness(laws[each]) for each in present])
+        moduli = np.zeros((len(young), len(present), 8))
+        np.put_along_axis(moduli, law[:, None], young[:, None], axis=1)
+        summed = moduli.reshape(len(young), -1) @ kernels.reshape(-1, 576)
+        return (self.edge * summed).reshape(-1, 24, 24)
+
+    def _nodal_mass(self, chosen: Chosen) -> Array:
         """Element masses (c, 8, 8) [kg] between corners, the same for each displacement component.
 
         The trilinear shape functions are integrated over the filled octants: P^T M P of the fine
@@ -135,7 +197,8 @@ class HexElements(Elements):
         with hanging corners take what is theirs of it.
         """
         octants = np.unpackbits(self.fill[chosen][:, None], axis=1, bitorder="little")
-        scale = self.density * (self.edge / 2.0) ** 3
+        density = self.regions.density[0 if self.region is None else self.region[chosen]]
+        scale = density * (self.edge / 2.0) ** 3
         mass = (scale * octants @ coarse_cell_mass().reshape(8, 64)).reshape(-1, 8, 8)
         filled = self.fill[chosen] == ALL_FILLED
         if self.kinds is not None:

@@ -1,7 +1,8 @@
 """The elastic solid that K u = lambda M u is assembled from, and its mass, centre and inertia."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self, TypedDict, Unpack, cast
 
 import numpy as np
@@ -9,21 +10,17 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags
 from carillon.fem.block import ALL_FILLED
-from carillon.fem.element import DEFAULT_POISSON, shape_functions
 from carillon.fem.elements import Chosen, Elements, HexElements
+from carillon.fem.embedding import embedding
 from carillon.fem.geometry import HexMesh
-from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.moduli import at_points, require_moduli
+from carillon.fem.regions import DEFAULT_DENSITY as DEFAULT_DENSITY
+from carillon.fem.regions import Damping as Damping
+from carillon.fem.regions import RegionOf, Regions
+from carillon.fem.supports import Attached, Supports
 
 RIGID_MODES = 6
 """Motions without strain of a connected free body."""
-
-DEFAULT_DENSITY = 1000.0
-"""Mass density [kg/m^3] where none is given."""
-
-
-Damping = tuple[float, float]
-"""Rayleigh's coefficients of mass [1/s] and of stiffness [s]."""
 
 
 class Solid(ABC):
@@ -33,11 +30,38 @@ class Solid(ABC):
     """Voxels that carry the material, or the elements that replace them, and all nodes."""
     young: Array
     """Young's moduli [Pa] that belong to them."""
-    poisson: float
-    density: float
-    """Poisson's ratio and mass density [kg/m^3]."""
-    damping: Damping | None
-    """Rayleigh's coefficients of mass [1/s] and of stiffness [s], if they are known."""
+    regions: Regions
+    """Materials, without these moduli."""
+    region: RegionOf | None
+    """Region of each cell, (m,) or that of its octants (m, 8); None if there is one."""
+    supports: Supports | None
+    """What holds it, or is fixed to it; None of a free solid."""
+
+    @property
+    def poisson(self) -> float | None:
+        """Poisson's ratio; None if it is not the same all over, or has no meaning."""
+        return self.regions.poisson
+
+    @property
+    @abstractmethod
+    def density(self) -> float:
+        """Mean mass density [kg/m^3], without masses that are fixed to it."""
+
+    @property
+    def damping(self) -> Damping | None:
+        """Rayleigh's coefficients, if they are known, and the same all over."""
+        known = set(self.regions.damping)
+        return known.pop() if len(known) == 1 else None
+
+    @cached_property
+    def rigid_modes(self) -> int:
+        """Motions without strain that its supports leave it."""
+        if self.supports is None:
+            return RIGID_MODES
+        nodes = self.mesh.nodes
+        centre = nodes.mean(axis=0)
+        extent = float(np.abs(nodes - centre).max())
+        return self.supports.free_motions(centre, extent).shape[1]
 
     @property
     def n_dofs(self) -> int:
@@ -65,10 +89,6 @@ class Solid(ABC):
         """Which octants (c, 8) of the elements hold material."""
 
     @abstractmethod
-    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        """Weights (p, k) of the nodes of `elements` (p,) at places (p, 3) in them, from 0 to 1."""
-
-    @abstractmethod
     def element_moduli(self, young: Array) -> Array:
         """Moduli (c, p) [Pa] at the elements' points from those that a user gives.
 
@@ -79,12 +99,23 @@ class Solid(ABC):
     def with_young(self, young: Array) -> Self:
         """Copy of the solid with other Young's moduli [Pa], see `element_moduli`."""
 
-    def with_constants(
-        self, poisson: float, density: float, damping: Damping | None = None
-    ) -> Self:
-        """The same solid with another Poisson's ratio, mass density [kg/m^3] and damping."""
+    def with_regions(self, regions: Regions) -> Self:
+        """The same solid of other materials, with the same moduli."""
         # Every kind of solid is a dataclass.
-        return replace(cast(Any, self), poisson=poisson, density=density, damping=damping)
+        return replace(cast(Any, self), regions=regions)
+
+    def with_supports(self, supports: Supports | None) -> Self:
+        """The same solid held otherwise."""
+        return replace(cast(Any, self), supports=supports)
+
+    def attached(self) -> tuple[NDArray[np.int32] | None, Attached | None]:
+        """Supports as they act on the elements, see `Elements`."""
+        if self.supports is None:
+            return None, None
+        free = self.with_supports(None)
+        found, weights = embedding(free, self.supports.positions)
+        count = len(self.connectivity)
+        return Attached.to_elements(self.supports, found, weights, count)
 
     @property
     @abstractmethod
@@ -111,21 +142,32 @@ class ElasticModel(Solid):
     fill: NDArray[np.uint8]
     """(m,) bit pattern of the octants of each cell that hold mass; 255 everywhere on a fine
     mesh."""
-    poisson: float = DEFAULT_POISSON
-    density: float = DEFAULT_DENSITY
-    """Mass density of the filled octants [kg/m^3]."""
+    regions: Regions = field(default_factory=Regions.one)
+    region: RegionOf | None = None
+    """(m, 8) region of each octant, and of the quadrature point in it; None if there is one."""
     lumped: bool = False
     """Whether the mass is row-sum lumped (diagonal) instead of consistent."""
     lumped_share: float = 0.0
     """Share of lumped in the mass of cells whose octants are all filled; the rest is consistent. A
     mixture disperses less than either (`dataset_gen.objectives.lumped_share`). In a mixed mesh the
     mass of fine cells has none."""
-    damping: Damping | None = None
+    supports: Supports | None = None
 
-    @property
+    @cached_property
     def elements(self) -> HexElements:
-        constants = self.poisson, self.density, self.lumped, self.lumped_share
-        return HexElements(self.young, self.fill, self.mesh.edge, *constants, self.mesh.kinds)
+        support, attached = self.attached()
+        return HexElements(
+            self.young,
+            self.fill,
+            self.mesh.edge,
+            self.regions,
+            self.lumped,
+            self.lumped_share,
+            self.mesh.kinds,
+            self.region,
+            support,
+            attached,
+        )
 
     @property
     def connectivity(self) -> NDArray[np.int32]:
@@ -139,13 +181,6 @@ class ElasticModel(Solid):
     def filled(self) -> Flags:
         return np.unpackbits(self.fill[:, None], axis=1, bitorder="little").astype(bool)
 
-    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        """Trilinear weights (p, 8); what a hanging corner says is the nodes' that it hangs from."""
-        weights = shape_functions(places)
-        if self.mesh.kinds is None:
-            return weights
-        return np.einsum("pk,pkj->pj", weights, node_weights()[self.mesh.kinds[elements]])
-
     def element_moduli(self, young: Array) -> Array:
         return at_points(require_moduli(young, self.mesh.n_cells))
 
@@ -154,23 +189,53 @@ class ElasticModel(Solid):
 
     @property
     def mass(self) -> float:
-        octants = np.unpackbits(self.fill[:, None], axis=1).sum(axis=1, dtype=int)
-        if self.mesh.span is not None:
-            octants = octants * self.mesh.span.astype(int) ** 3
-        return float(octants.sum() * self.density * (self.mesh.edge / 2.0) ** 3)
+        octants = self._octants
+        if self.region is None:
+            held = float(octants.sum())
+            return float(held * self.regions.density[0] * (self.mesh.edge / 2.0) ** 3)
+        held = float((octants * self.regions.density[self.region]).sum())
+        return held * (self.mesh.edge / 2.0) ** 3
+
+    @property
+    def density(self) -> float:
+        if self.region is None:
+            return float(self.regions.density[0])
+        return self.mass / float(self._octants.sum() * (self.mesh.edge / 2.0) ** 3)
+
+    @property
+    def _octants(self) -> NDArray[np.integer]:
+        """Volume (m, 8) of each octant that is filled, in those of the smaller cells."""
+        octants = np.unpackbits(self.fill[:, None], axis=1, bitorder="little").astype(int)
+        return (
+            octants
+            if self.mesh.span is None
+            else octants * self.mesh.span[:, None].astype(int) ** 3
+        )
+
+    @property
+    def cell_regions(self) -> RegionOf | None:
+        """Region (m,) of each cell of a fine mesh; None if there is one."""
+        return None if self.region is None else self.region[:, 0]
+
+    @property
+    def constants(self) -> "Constants":
+        """What models of the same solid on other meshes share with it, but for the regions'
+        places."""
+        return {"regions": self.regions, "lumped": self.lumped, "supports": self.supports}
 
 
 class Constants(TypedDict, total=False):
-    """Constants of an `ElasticModel` that are the same in every cell."""
+    """What is the same in every cell of an `ElasticModel`."""
 
-    poisson: float
-    density: float
+    regions: Regions
     lumped: bool
-    damping: Damping | None
+    supports: Supports | None
 
 
-def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> ElasticModel:
-    """Solid of a fine mesh with moduli `young`, (m,) or (m, 8) [Pa].
+def fine_model(
+    mesh: HexMesh, young: Array, region: RegionOf | None = None, **constants: Unpack[Constants]
+) -> ElasticModel:
+    """Solid of a fine mesh with moduli `young`, (m,) or (m, 8) [Pa], and the `region` (m,) of each.
 
     Raises UserError for what `carillon.fem.moduli.require_moduli` refuses.
 
@@ -178,7 +243,7 @@ def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> E
     --------
     >>> from carillon.fem.geometry import hexmesh_from_grid
     >>> mesh = hexmesh_from_grid(np.array([[0, 0, 0], [1, 0, 0]]), np.zeros(3), 0.5)
-    >>> model = fine_model(mesh, np.array([1e9, 2e9]), density=1000.0)
+    >>> model = fine_model(mesh, np.array([1e9, 2e9]), regions=Regions.one(density=1000.0))
     >>> model.n_dofs, model.mass
     (36, 250.0)
     """
@@ -186,6 +251,7 @@ def fine_model(mesh: HexMesh, young: Array, **constants: Unpack[Constants]) -> E
         mesh,
         at_points(require_moduli(young, mesh.n_cells)),
         np.full(mesh.n_cells, ALL_FILLED, dtype=np.uint8),
+        region=None if region is None else np.repeat(region[:, None], 8, axis=1),
         **constants,
     )
 

@@ -1,4 +1,4 @@
-"""Arrays and numbers of HDF5 files, checked as they are read.
+"""Arrays and numbers of HDF5 files, described as they are written and checked as they are read.
 
 A seal tells that a file is as it was written, not that what was written makes sense.
 """
@@ -16,6 +16,16 @@ REAL, INTEGER = "f", "iu"
 """Kinds of numbers, as numpy's codes."""
 
 _NAMES = {REAL: "real numbers", INTEGER: "integers"}
+
+
+def put(
+    group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str | None = None
+) -> None:
+    """Write one dataset with a checksum, its unit and what it is."""
+    dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
+    dataset.attrs["units"] = units
+    if long_name is not None:
+        dataset.attrs["long_name"] = long_name
 
 
 def find(

@@ -29,6 +29,14 @@ def between(low: float, high: float) -> Within:
     return Within(ge=low, le=high)
 
 
+def _printable(name: str) -> str:
+    if name.isspace() or not name.isprintable():
+        raise ValueError(
+            f"found {name!r}, expected characters that can be printed, and not blanks alone"
+        )
+    return name
+
+
 def _bearable(workers: int) -> int:
     cores = allowed_cores()
     most = max(WORKERS_OF_MACHINE, WORKERS_OF_CORE * cores)
@@ -61,6 +69,8 @@ WorkersAnywhere = Annotated[int, between(1, MOST_WORKERS)]
 """A number of processes or threads, on whatever machine."""
 Workers = Annotated[WorkersAnywhere, Check(_bearable)]
 """A number of processes or threads, no more than this machine could bear."""
+ShownName = Annotated[str, Within(min_length=1, max_length=100), Check(_printable)]
+"""A name that messages and pages show."""
 Positive = Annotated[float, Within(gt=0.0)]
 NonNegative = Annotated[float, Within(ge=0.0)]
 Seed = Annotated[int, between(0, LARGEST), "seed of random numbers"]

@@ -4,8 +4,8 @@ from itertools import takewhile
 
 import parameter_tables
 
+from carillon.composition.materials import MATERIALS, named_material
 from sound.project.project import Project
-from sound.scenes.materials import MATERIALS, named_material
 from sound.scenes.scene import Scene
 from workflow import settings
 from workflow.configuration.whole import limits, whole

@@ -16,7 +16,8 @@ from scipy.sparse import csr_matrix
 
 from carillon.arrays import Array, Index
 from carillon.fem.block import NODES, degrees_of_freedom
-from carillon.fem.element import KEPT, elasticity_matrix, strain_displacement
+from carillon.fem.elasticity import Elasticity
+from carillon.fem.element import KEPT, strain_displacement
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.finite_cells.shapes import (
     POINTS,
@@ -63,17 +64,23 @@ def cubic_surplus(model: FiniteCellModel, values: Array, modes: Array) -> CubicS
     for first in range(0, len(numbers), CHUNK):
         few = slice(first, first + CHUNK)
         edges = model.cells.span[few, None] * elements.edge
-        stiff = edges * elements.young[few]
-        mass = model.density * edges**3 * elements.share[few]
-        exact, rest = _stiffness(model.poisson)
-        own = stiff @ exact + stiff.sum(axis=1, keepdims=True) * rest
+        mass = float(model.regions.density[0]) * edges**3 * elements.share[few]
+        own, across = np.zeros((len(edges), 36 * 36)), np.zeros((len(edges), 36 * 81))
+        for law, among, moduli in elements.by_law(few):
+            stiff = edges[among] * moduli
+            exact, rest = _stiffness(model.regions.laws[law])
+            own[among] += stiff @ exact + stiff.sum(axis=1, keepdims=True) * rest
+            across[among] += stiff @ _coupling(model.regions.laws[law])
         matrices[few] = own.reshape(-1, 36, 36)
-        across = (stiff @ _coupling(model.poisson)).reshape(-1, 36, 81)
+        across = across.reshape(-1, 36, 81)
         inertia = (mass @ _inertia()).reshape(-1, 12, 27)
         # Cells beside others of another size have nodes elsewhere, and no function here.
         moved = modes[degrees_of_freedom(nodes[few])]
         pulled = inertia @ moved.reshape(len(moved), 27, -1)
         inside = elements.share[few].sum(axis=1) > LEAST_INSIDE
+        if elements.support is not None:
+            # What holds a cell holds these functions, too.
+            inside &= elements.support[few] < 0
         forces[few] = pulled.reshape(len(moved), 36, -1) * values - across @ moved
         forces[few] *= inside[:, None, None]
     return _solved(matrices, dofs, 3 * count, forces, FLOOR * _typical(model))
@@ -107,7 +114,7 @@ def _numbers(model: FiniteCellModel) -> tuple[Index, int]:
 
 def _typical(model: FiniteCellModel) -> float:
     """Stiffness [N/m] of a function in a cell of the median modulus that is all inside."""
-    exact, rest = _stiffness(model.poisson)
+    exact, rest = _stiffness(model.regions.laws[0])
     table = octant_weights().sum(axis=0) @ exact + rest
     edge = float(model.cells.span.min()) * model.elements.edge
     return float(np.median(model.young) * edge * np.diag(table.reshape(36, 36)).min())
@@ -173,30 +180,30 @@ def _functions(low: bool = False) -> tuple[Array, Array]:
     return values, gradients
 
 
-def _factors(poisson: float, low: bool = False) -> Array:
+def _factors(law: Elasticity, low: bool = False) -> Array:
     """Strains (125, 6, 36) at the points, as `strain_factors`."""
-    root = np.linalg.cholesky(elasticity_matrix(poisson)).T
+    root = np.linalg.cholesky(law.matrix).T
     return np.asarray(root @ strain_displacement(_functions(low)[1]))
 
 
 @lru_cache(KEPT)
-def _stiffness(poisson: float) -> tuple[Array, Array]:
+def _stiffness(law: Elasticity) -> tuple[Array, Array]:
     """Between functions: (125, 36 * 36) by points, see `point_stiffness`, and (36 * 36,) the rest.
 
     Points integrate over a cell that a surface cuts what is of degree four at most, so they are
     given strains of degree two. The rest is orthogonal to these in a cell that is all inside, and
     enters by the share that is.
     """
-    low, whole = (_factors(poisson, each) for each in (True, False))
+    low, whole = (_factors(law, each) for each in (True, False))
     by_points = [(each.transpose(0, 2, 1) @ each).reshape(POINTS, -1) for each in (low, whole)]
     rest = octant_weights().sum(axis=0) @ (by_points[1] - by_points[0])
     return by_points[0], rest
 
 
 @lru_cache(KEPT)
-def _coupling(poisson: float) -> Array:
+def _coupling(law: Elasticity) -> Array:
     """Between functions and displacements of a cell's nodes (125, 36 * 81)."""
-    products = _factors(poisson).transpose(0, 2, 1) @ strain_factors(poisson)
+    products = _factors(law).transpose(0, 2, 1) @ strain_factors(law)
     return np.asarray(products.reshape(POINTS, -1))
 
 

@@ -9,7 +9,9 @@ from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.command_line.progress import say
+from carillon.composition.composition import PlacedRegions
 from carillon.errors import UserError
+from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel
 from solver.accuracy.estimate import CellErrors, estimate_cell_errors
@@ -29,8 +31,15 @@ MOST_STEPS = 3
 class DividedCells:
     """A solid of finite cells and which of them are divided."""
 
-    def __init__(self, covering: Covering, model: FiniteCellModel) -> None:
+    def __init__(
+        self,
+        covering: Covering,
+        model: FiniteCellModel,
+        placed_on: Callable[[FiniteCells], PlacedRegions] | None = None,
+    ) -> None:
         self.model, self._undivided, self._covering = model, model, covering
+        alike = PlacedRegions(model.regions)
+        self._placed_on = placed_on or (lambda cells: alike)
         self._places: Index = np.empty((0, 3), dtype=np.int64)
         self._steps = 0
 
@@ -73,8 +82,22 @@ class DividedCells:
             say(f"no more cells are divided: {error}")
             return False
         self._places = together
-        young = self._undivided.young[division.voxel]
-        self.model = replace(self._undivided, cells=division.cells, young=young)
+        factor = self._undivided.young
+        whole = self._undivided
+        if whole.region is not None:
+            factor = factor / whole.regions.young[whole.region]
+        placed = self._placed_on(division.cells)
+        young = factor[division.voxel]
+        if placed.region is not None:
+            young = placed.regions.moduli(placed.region, young)
+        self.model = replace(
+            whole,
+            cells=division.cells,
+            young=young,
+            regions=placed.regions,
+            region=placed.region,
+            shared=placed.shared,
+        )
         self._steps += 1
         return True
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.model import RIGID_MODES
 from solver.accuracy.cubics import CubicSurplus, cubic_surplus
 from solver.accuracy.surplus import losses
 from solver.refinement.errors import LAST, ExpectedErrors
@@ -55,7 +54,7 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     >>> 0.0 < estimate_cell_errors(model, found.eigenvalues, found.modes).errors.rms < 0.2
     True
     """
-    elastic = slice(RIGID_MODES, min(LAST, len(values)))
+    elastic = slice(model.rigid_modes, min(LAST, len(values)))
     chosen = np.ascontiguousarray(modes[:, elastic])
     twice, fourfold, group = losses(model, chosen)
     own = values[elastic]
@@ -65,7 +64,7 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     # A frequency's relative error is half its eigenvalue's.
     shares = 0.5 * twice / own / (factors - 1.0)[:, None]
     shares += _unseen(cubic_surplus(model, own, chosen), own, shares.sum(axis=0))
-    errors = ExpectedErrors(shares.sum(axis=0))
+    errors = ExpectedErrors(shares.sum(axis=0), model.rigid_modes)
     return CellErrors(errors, np.sqrt(np.mean(shares**2, axis=1)), factors)
 
 

@@ -211,7 +211,7 @@ def _reference(solved: Solved) -> Reference:
 
 def _undivided(problem: Problem | None) -> DividedCells:
     assert problem is not None and problem.covering is not None
-    return DividedCells(problem.covering, problem.finite_cells)
+    return DividedCells(problem.covering, problem.finite_cells, problem.placed_on)
 
 
 def _coarse(solid: ProblemOptions, problem: Problem | None, start: str | None) -> RefinedModel:
@@ -224,14 +224,7 @@ def _coarse(solid: ProblemOptions, problem: Problem | None, start: str | None) -
 
 
 def _fine(problem: Problem) -> ElasticModel:
-    coarse = problem.hexahedra
-    return fine_model(
-        problem.fine,
-        problem.young,
-        poisson=coarse.poisson,
-        density=coarse.density,
-        lumped=coarse.lumped,
-    )
+    return fine_model(problem.fine, problem.young, problem.region, **problem.hexahedra.constants)
 
 
 @parameters

@@ -10,7 +10,6 @@ from carillon.fem.finite_cells.build import covering
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry.grid import Grid, bounding_grid
-from carillon.fem.model import RIGID_MODES
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.material import INTERPOLATED, PlacedMaterial
 from solver.analysis.problem import Problem, ProblemOptions
@@ -36,9 +35,23 @@ class Reference:
         lattice = voxel_lattice(surface.triangles, options.resolution)
         cells = covering_on(surface.triangles, lattice, "largest", surface.name).cells
         gradual = options.material in INTERPOLATED
-        material = PlacedMaterial.of_voxels(lattice, problem.fine, problem.young, gradual)
+        placed, factor = problem.placed_on(cells), problem.young
+        if problem.region is not None:
+            factor = factor / problem.regions.young[problem.region]
+        material = PlacedMaterial.of_voxels(lattice, problem.fine, factor, gradual)
         young = material.on(cells.mesh)
-        return cls(finite_cell_model(cells, young, options.poisson, options.density))
+        if placed.region is not None:
+            young = placed.regions.moduli(placed.region, young)
+        return cls(
+            finite_cell_model(
+                cells,
+                young,
+                placed.regions,
+                placed.region,
+                placed.shared,
+                problem.model.supports,
+            )
+        )
 
     def errors(self, voxels: Array, values: Array, modes: Array) -> ExpectedErrors:
         """Expected errors of the frequencies of the voxels, or of coarse elements of them.
@@ -51,10 +64,11 @@ class Reference:
             (l,) eigenvalues and (n_dofs, l) modes of the finite cells.
         """
         own = estimate_cell_errors(self.model, values, modes).errors.errors
-        count = min(len(own), len(voxels) - RIGID_MODES)
-        chosen = slice(RIGID_MODES, RIGID_MODES + count)
+        rigid = self.model.rigid_modes
+        count = min(len(own), len(voxels) - rigid)
+        chosen = slice(rigid, rigid + count)
         ratio = np.sqrt(np.maximum(voxels[chosen], 0.0) / values[chosen])
-        return ExpectedErrors(ratio * (1.0 + own[:count]) - 1.0)
+        return ExpectedErrors(ratio * (1.0 + own[:count]) - 1.0, rigid)
 
 
 def voxel_lattice(surface: Surface, resolution: int) -> Grid:

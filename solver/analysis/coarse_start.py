@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import Blocks, blocks_from_mesh, prolongation
-from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
+from carillon.fem.model import ElasticModel, Solid
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening
@@ -38,9 +38,9 @@ def coarse_start(
         modes=requested + default_guard(requested), tolerance=TOLERANCE, seed=solver.options.seed
     )
     modes = ModalSolver(coarse, options, comm, once=True).solve()
-    whole = modes.system.gather(modes.vectors[:, RIGID_MODES:])
+    whole = modes.system.gather(modes.vectors[:, modes.rigid :])
+    values = modes.values[modes.rigid :]
     modes.destroy()
-    values = modes.values[RIGID_MODES:]
     mesh = solver.local_mesh
 
     def rows() -> Array:
@@ -62,9 +62,8 @@ def _coarsened(model: Solid | None, coarsening: Coarsening | None) -> tuple[Bloc
         blocks,
         moduli,
         coarsening.lumped_fraction,
-        poisson=model.poisson,
-        density=model.density,
-        lumped=model.lumped,
+        model.cell_regions,
+        **model.constants,
     )
     return blocks, coarse
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from solver.analysis.bounds import default_keep, uncorrected_keep
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import System
@@ -121,8 +121,8 @@ def lowest_pairs(synthesis: Synthesis, count: int) -> tuple[Array, Array]:
 
 def elastic_part(system: System, synthesis: Synthesis) -> tuple[Array | None, Array]:
     """Ritz values and vectors without the rigid motions; no values if the two are not apart."""
-    elastic = np.ascontiguousarray(synthesis.vectors[:, RIGID_MODES:])
+    elastic = np.ascontiguousarray(synthesis.vectors[:, system.n_rigid :])
     overlap = system.inner(system.times_mass(system.rigid), elastic)
     if overlap.size and np.abs(overlap).max() > ORTHOGONAL_TO_RIGID:
         return None, synthesis.vectors
-    return synthesis.values[RIGID_MODES:], elastic
+    return synthesis.values[system.n_rigid :], elastic

@@ -9,7 +9,6 @@ import numpy as np
 from mpi4py import MPI
 
 from carillon.arrays import Array
-from carillon.fem.model import RIGID_MODES
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions
@@ -95,9 +94,9 @@ class CorrectedModes:
         """
         options, tolerance = self._options, self._options.tolerance
         tolerance = EIGENVALUE_TOLERANCE if tolerance is None else tolerance
-        requested = options.modes - RIGID_MODES
+        requested = options.modes - system.n_rigid
         if options.check_inertia:
-            requested = min(requested + SPARE_MODES, system.n_dofs - RIGID_MODES)
+            requested = min(requested + SPARE_MODES, system.n_dofs - system.n_rigid)
             # Said now, rather than once the modes are there, and lost.
             self._linear.tree.require_count(8 * requested * len(system.rigid))
         near = initial if isinstance(initial, Approximation) else None
@@ -131,7 +130,7 @@ class CorrectedModes:
             )
             del start  # a factorisation, and a copy of the modes
             rigid_values, rigid = rigid_pairs(system)
-        reached = float(result.errors[: options.modes - RIGID_MODES].max())
+        reached = float(result.errors[: options.modes - system.n_rigid].max())
         evidence |= {
             "linear_solver": self._linear.method,
             "corrections": result.steps,

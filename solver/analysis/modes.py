@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
 from solver.correction.random_start import Approximation
 from solver.linear import Lasting
@@ -33,9 +32,19 @@ class Modes:
     inverse: Lasting | None = None
     """Inverse that a warm start makes use of, if there is one."""
 
+    @property
+    def rigid(self) -> int:
+        """Number of modes without strain, which are the first ones."""
+        return self.system.n_rigid
+
+    @property
+    def elastic(self) -> Array:
+        """(local, k - r) the modes with strain."""
+        return self.vectors[:, self.rigid :]
+
     def start(self) -> Array:
-        """Elastic modes and guard vectors (local, k - 6 + g), to start a correction from."""
-        blocks = [self.vectors[:, RIGID_MODES:], *([] if self.guard is None else [self.guard])]
+        """Elastic modes and guard vectors, to start a correction from."""
+        blocks = [self.elastic, *([] if self.guard is None else [self.guard])]
         return np.concatenate(blocks, axis=1)
 
     def destroy(self) -> None:

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.composition.composition import PlacedRegions
+from carillon.composition.entries import CompositionEntry, Placed, compose, read_composition
+from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem import materials
-from carillon.fem.element import DEFAULT_POISSON
+from carillon.fem.elasticity import DEFAULT_POISSON
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
-from carillon.fem.materials import young_modulus
-from carillon.fem.model import DEFAULT_DENSITY, ElasticModel, Solid
-from carillon.limits import require_constants
+from carillon.fem.materials import UNIFORM_YOUNG, young_modulus
+from carillon.fem.model import ElasticModel, Solid, fine_model
+from carillon.fem.regions import DEFAULT_DENSITY, RegionOf, Regions
 from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.quantities import (
     Components,
@@ -38,8 +43,10 @@ from solver.coarsening.forest import FOREST
 from solver.coarsening.model import build_model
 
 if TYPE_CHECKING:  # Its import takes long.
+    from carillon.fem.finite_cells.cells import FiniteCells
     from carillon.fem.finite_cells.covering import Covering
 
+Held = TypeVar("Held", bound=Solid)
 DISCRETISATIONS = ("voxel", "finite-cell")
 AUTO = "auto"
 """Name of the choice that is left to the program."""
@@ -71,6 +78,15 @@ class ProblemOptions:
     components: Components = option("error")
     poisson: PoissonRatio = option(DEFAULT_POISSON)
     density: Density = option(DEFAULT_DENSITY)
+    regions: str | None = option(
+        None, "YAML file with the regions of the solid and what holds it", metavar="FILE"
+    )
+    fix: tuple[str, ...] | None = option(
+        None,
+        "what is held: comparisons of x, y and z [m], or region:NAME; each where all of it is "
+        "there",
+        metavar="WHERE",
+    )
     lumped: bool = option(False, "lump the mass")
     seed: Number = option(
         0, "of random materials, the partition, and the vectors that slepc and arpack start from"
@@ -105,9 +121,24 @@ class Problem:
     model: Solid
     """What is solved: the voxels, coarse elements of them, or finite cells."""
     seconds: dict[str, float]
+    region: RegionOf | None = None
+    """(m,) region of each voxel; None if there is one."""
+    composed: Placed = Placed(None, ())
+    """Regions and supports, in any discretisation."""
     coarsening: dict[str, str] = field(default_factory=dict)
     """What the coarse elements rest on, see `Coarsening.record`."""
     covering: Covering | None = None
+
+    def placed_on(self, cells: FiniteCells) -> PlacedRegions:
+        """The regions as finite cells of the same solid have them."""
+        if self.composed.composition is None:
+            return PlacedRegions(self.model.regions)
+        return self.composed.composition.of_cells(cells, complete=False)
+
+    @property
+    def regions(self) -> Regions:
+        """Materials of the solid."""
+        return self.model.regions
 
     @property
     def extents(self) -> tuple[float, ...]:
@@ -140,7 +171,6 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     The `surface` of the mesh that `options` name is read if not given. Raises UserError for
     anything wrong with the mesh, the material or the parameters.
     """
-    require_constants(options.poisson, options.density)
     begin = time.perf_counter()
     if surface is None:
         surface = SolidSurface.read(options.mesh, options.unit)
@@ -149,24 +179,42 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     meshed = time.perf_counter()
     label = f"mesh '{surface.name}', resolution {options.resolution}"
     young = young_modulus(options.material, mesh, options.seed, label)
+    composed = _composed(options, surface)
+    placed = PlacedRegions(Regions.one(options.poisson, options.density))
+    if composed.composition is not None:
+        if covering is None:
+            placed = composed.composition.of_voxels(mesh)
+        else:
+            placed = composed.composition.of_cells(covering.cells)
+        young = placed.regions.moduli(placed.region, young / UNIFORM_YOUNG)
     assigned = time.perf_counter()
     seconds = {"mesh": meshed - begin, "material": assigned - meshed}
+    whole = partial(Problem, surface, mesh, young, region=placed.region, composed=composed)
     if covering is not None:
-        cells = finite_cell_model(covering.cells, young, options.poisson, options.density)
-        return Problem(surface, mesh, young, cells, seconds, covering=covering)
+        placing = placed.regions, placed.region, placed.shared
+        cells = finite_cell_model(covering.cells, young, *placing)
+        return whole(_held(cells, composed, surface), seconds, covering=covering)
     coarsening = options.coarsening()
-    elements = build_model(
-        mesh,
-        young,
-        coarsening,
-        poisson=options.poisson,
-        density=options.density,
-        lumped=options.lumped,
-    )
+    fine = fine_model(mesh, young, placed.region, regions=placed.regions, lumped=options.lumped)
+    fine = _held(fine, composed, surface)
     if coarsening is None:
-        return Problem(surface, mesh, young, elements, seconds)
+        return whole(fine, seconds)
+    elements = build_model(mesh, young, coarsening, region=placed.region, **fine.constants)
     seconds["coarsening"] = time.perf_counter() - assigned
-    return Problem(surface, mesh, young, elements, seconds, coarsening.record())
+    return whole(elements, seconds, coarsening=coarsening.record())
+
+
+def _composed(options: ProblemOptions, surface: SolidSurface) -> Placed:
+    """Regions and supports that the options name."""
+    entry, folder = CompositionEntry(), Path()
+    if options.regions is not None:
+        entry, folder = read_composition(options.regions), Path(options.regions).parent
+    return compose(entry, surface.triangles, surface.name, folder, options.fix or ())
+
+
+def _held(solid: Held, composed: Placed, surface: SolidSurface) -> Held:
+    supports = placed_supports(composed.supports, solid, surface.triangles, surface.name)
+    return solid if supports is None else solid.with_supports(supports)
 
 
 def discretised(surface: SolidSurface, options: ProblemOptions) -> tuple[HexMesh, Covering | None]:

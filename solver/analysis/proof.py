@@ -20,7 +20,7 @@ from solver.reference.truth import (
 )
 from solver.verification.residuals import (
     require_orthonormal,
-    require_six_rigid,
+    require_rigid,
     rigid_modes,
     verify,
 )
@@ -96,7 +96,7 @@ def prove(
     """Residual ratios (k,) of eigenpairs, whose properties go into `evidence`; collective.
 
     `exact` ones shall be eigenpairs, not just approximations of some. Raises ConvergenceError if
-    the modes are not orthonormal, or exact ones do not have six rigid motions.
+    the modes are not orthonormal, or exact ones do not have the rigid motions that supports leave.
     """
     with phases("verification"):
         residuals, orthogonality = verify(system, values, vectors)
@@ -108,5 +108,5 @@ def prove(
     }
     require_orthonormal(orthogonality)
     if exact:
-        require_six_rigid(evidence["rigid_modes"])
+        require_rigid(evidence["rigid_modes"], system.n_rigid)
     return residuals

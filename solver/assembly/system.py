@@ -43,6 +43,9 @@ class Layout:
     """Node graph of its rows, and the exchange of rows with its neighbours."""
     coordinates: Array
     """(local nodes, 3) positions relative to the centroid, in units of the largest half extent."""
+    centre: Array
+    extent: float
+    """(3,) centroid of the nodes, and largest half extent [m]."""
     comm: MPI.Comm
 
     @classmethod
@@ -52,7 +55,7 @@ class Layout:
         starts = [local_mesh.decomposition.local_range(rank)[0] for rank in range(comm.size)]
         starts.append(local_mesh.decomposition.n_nodes)
         halo = Halo(pattern.ghosts, pattern.start, np.array(starts), comm)
-        return cls(local_mesh, pattern, halo, _centred(local_mesh, comm), comm)
+        return cls(local_mesh, pattern, halo, *_centred(local_mesh, comm), comm)
 
 
 @dataclass(frozen=True)
@@ -62,9 +65,10 @@ class System:
     rows: NodeRows
     """This rank's rows of K [N/m] and M [kg]."""
     rigid: Array
-    """(local, 6) this rank's rows of the mass-orthonormal rigid motions."""
+    """(local, r) rows of the mass-orthonormal rigid motions that supports leave: all six
+    of a free body."""
     mass_rigid: Array
-    """(local, 6) M times these."""
+    """(local, r) M times these."""
     coordinates: Array
     """(local nodes, 3) positions relative to the centroid, in units of the largest half extent."""
     nodes: Index
@@ -75,6 +79,11 @@ class System:
     n_dofs: int
     """Number of unknowns over all ranks."""
     comm: MPI.Comm
+
+    @property
+    def n_rigid(self) -> int:
+        """Number of rigid motions."""
+        return self.rigid.shape[1]
 
     def times_stiffness(self, block: Array) -> Array:
         """Product of K with a block of vectors; collective."""
@@ -205,7 +214,11 @@ def assemble(
     if like is not None:
         return replace(like, rows=rows)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
-    motions = np.ascontiguousarray(rigid_motions(layout.coordinates, np.zeros(3)))
+    motions = rigid_motions(layout.coordinates, np.zeros(3))
+    if elements.attached is not None:
+        supports = elements.attached.supports
+        motions = motions @ supports.free_motions(layout.centre, layout.extent)
+    motions = np.ascontiguousarray(motions)
     mass_motions = rows.times_mass(motions)
     system = System(
         rows,
@@ -225,14 +238,18 @@ def assemble(
     return replace(system, rigid=rigid, mass_rigid=mass_rigid)
 
 
-def _centred(local_mesh: LocalMesh, comm: MPI.Comm) -> Array:
-    """Positions of this rank's nodes about the centroid, in units of the largest half extent."""
+def _centred(local_mesh: LocalMesh, comm: MPI.Comm) -> tuple[Array, Array, float]:
+    """Positions of this rank's nodes about the centroid, in units of the largest half extent.
+
+    With them come the centroid (3,) and that extent [m].
+    """
     total = local_mesh.positions.sum(axis=0)
     comm.Allreduce(MPI.IN_PLACE, total)
-    centred = local_mesh.positions - total / local_mesh.decomposition.n_nodes
+    centre = total / local_mesh.decomposition.n_nodes
+    centred = local_mesh.positions - centre
     extent = np.abs(centred).max(keepdims=True)
     comm.Allreduce(MPI.IN_PLACE, extent, op=MPI.MAX)
-    return np.asarray(centred / extent)
+    return np.asarray(centred / extent), centre, float(extent[0, 0])
 
 
 def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:

@@ -10,6 +10,7 @@ from carillon.fem.block import ALL_FILLED
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
 from carillon.fem.model import Constants, ElasticModel, fine_model
 from carillon.fem.moduli import at_points, require_moduli
+from carillon.fem.regions import RegionOf
 from solver.coarsening.coarsening import Coarsening
 
 
@@ -31,11 +32,26 @@ def element_moduli(blocks: Blocks, young: Array, coarsening: Coarsening) -> Arra
     return moduli
 
 
+def block_regions(blocks: Blocks, region: RegionOf | None) -> RegionOf | None:
+    """Region (mc, 8) of each octant of the elements from those (m,) of the fine cells.
+
+    A void octant has the region that most of the block is of, a fine cell's octants have its own.
+    """
+    if region is None:
+        return None
+    of_cells = np.where(blocks.mask, region[blocks.fine_of_block], 0)
+    present = np.unique(region)
+    counts = ((of_cells[:, :, None] == present) & blocks.mask[:, :, None]).sum(axis=1)
+    most = present[counts.argmax(axis=1)]
+    return np.where(blocks.mask, of_cells, most[:, None]).astype(region.dtype)
+
+
 def build_model(
     mesh: HexMesh,
     young: Array,
     coarsening: Coarsening | None = None,
     refined: Flags | None = None,
+    region: RegionOf | None = None,
     **constants: Unpack[Constants],
 ) -> ElasticModel:
     """Model of the fine mesh, or of its blocks if there is a coarsening.
@@ -48,8 +64,10 @@ def build_model(
         (m,) modulus [Pa] of each fine cell; without a coarsening also (m, 8).
     refined
         Coarse elements that shall stay fine, see `blocks_from_mesh`.
+    region
+        (m,) region of each fine cell, if there are several.
     constants
-        `poisson`, `density` [kg/m^3], `lumped`, see `ElasticModel`.
+        `regions`, `lumped`, `supports`, see `ElasticModel`.
 
     Examples
     --------
@@ -61,22 +79,33 @@ def build_model(
     (2, (2, 8))
     """
     if coarsening is None:
-        return fine_model(mesh, young, **constants)
+        return fine_model(mesh, young, region, **constants)
     given = require_moduli(young, mesh.n_cells)
     if given.ndim > 1:
         raise UserError(f"moduli: an array of shape {given.shape}, expected ({mesh.n_cells},)")
     blocks = blocks_from_mesh(mesh, refined)
     moduli = element_moduli(blocks, given, coarsening)
-    return coarse_model(blocks, moduli, coarsening.lumped_fraction, **constants)
+    return coarse_model(blocks, moduli, coarsening.lumped_fraction, region, **constants)
 
 
 def coarse_model(
-    blocks: Blocks, moduli: Array, lumped_fraction: float = 0.0, **constants: Unpack[Constants]
+    blocks: Blocks,
+    moduli: Array,
+    lumped_fraction: float = 0.0,
+    region: RegionOf | None = None,
+    **constants: Unpack[Constants],
 ) -> ElasticModel:
     """Model of the blocks with moduli (mc, 8) [Pa] that a coarsening made, or of their fine cells.
 
     The consistent part of the mass is P^T M P over the filled cells; `lumped_fraction` is that of
-    the coarsening.
+    the coarsening, `region` (m,) that of each fine cell.
     """
     fill = np.where(blocks.is_fine, np.uint8(ALL_FILLED), blocks.pattern)
-    return ElasticModel(blocks.coarse, moduli, fill, lumped_share=lumped_fraction, **constants)
+    return ElasticModel(
+        blocks.coarse,
+        moduli,
+        fill,
+        region=block_regions(blocks, region),
+        lumped_share=lumped_fraction,
+        **constants,
+    )

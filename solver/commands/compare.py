@@ -82,6 +82,9 @@ def _differences(material: dict[str, Any]) -> str:
         if name in material:
             own, truth = material[name]
             parts.append(f"{noun} {own:.6g}, the truth's {truth:.6g}")
+    if "elasticity" in material:
+        own, truth = (", ".join(names) for names in material["elasticity"])
+        parts.append(f"elasticity of {own}; the truth's of {truth}")
     return f"another one: {'; '.join(parts)}"
 
 

@@ -78,7 +78,7 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
     assert solved.problem is not None
     problem, hertz = solved.problem, frequencies(solved.modes.values)
     total = sum(attributes["timings"].values())
-    elastic = hertz[6:]
+    elastic = hertz[solved.modes.rigid :]
     span = f"{elastic[0]:.2f} to {elastic[-1]:.2f} Hz" if len(elastic) else "none elastic"
     added = attributes.get("modes_added", 0)
     late = f", {added} found after the first search" if added else ""

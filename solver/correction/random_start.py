@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
+from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
 from solver.correction.lanczos import Lanczos, lanczos, mixed
 from solver.correction.shift import AIM, inverse_amid, is_amid
@@ -82,7 +83,7 @@ def from_nothing(
     share, last = AIM, None
     given = None if near is None else near.inverse
     for attempt in range(ATTEMPTS):
-        if given is not None and is_amid(given, requested):
+        if given is not None and is_amid(given, requested, system.n_rigid):
             inverse = given
         elif last is None:
             first = None if near is None else float(near.values[int(share * requested)])
@@ -94,6 +95,9 @@ def from_nothing(
             start, look = mixed(
                 system, near.values, near.vectors(), requested, inverse.shift, tolerance, columns
             )
+        elif system.n_rigid < RIGID_MODES:
+            # Stiff springs hold points, which random vectors move far.
+            start = inverse.solve(system.times_mass(start))
         result = lanczos(system, inverse, start, accurate, width, tolerance, look, seed + 1)
         if result.too_high and attempt < ATTEMPTS - 1:
             last = float(result.values[requested - 1])

@@ -2,7 +2,6 @@
 
 from math import exp, inf, log
 
-from carillon.fem.model import RIGID_MODES
 from solver.assembly.system import System
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.weyl import CountingLaw
@@ -35,13 +34,14 @@ def inverse_amid(
     first
         Shift to begin with, if more is known than the law.
     """
-    target = share * requested + RIGID_MODES
+    rigid = system.n_rigid
+    target = share * requested + rigid
     # Shifts with too few and with too many eigenvalues below, and how many these are.
     low, high = (0.0, 0), (inf, 0)
     shift = first or law.eigenvalue(target)
     for attempt in range(MOST_TRIES):
         inverse = linear.inverse(system, shift)
-        below = inverse.negative - RIGID_MODES
+        below = inverse.negative - rigid
         few = below < LEAST * requested and high[0] > CROWDED * shift
         if below <= MOST * requested and (attempt >= TRIES - 1 or not few):
             break
@@ -51,19 +51,24 @@ def inverse_amid(
         low, high = ((shift, below), high) if few else (low, (shift, below))
         if low[0] > 0.0 and high[0] < inf:
             # A crowd of eigenvalues is left behind at last.
-            shift = _between(low, high, target) if attempt < TRIES else (low[0] * high[0]) ** 0.5
+            shift = (
+                _between(low, high, target, rigid) if attempt < TRIES else (low[0] * high[0]) ** 0.5
+            )
         else:
-            shift *= law.eigenvalue(target) / law.eigenvalue(below + RIGID_MODES)
+            shift *= law.eigenvalue(target) / law.eigenvalue(below + rigid)
     return inverse
 
 
-def _between(low: tuple[float, int], high: tuple[float, int], target: float) -> float:
+def _between(low: tuple[float, int], high: tuple[float, int], target: float, rigid: int) -> float:
     """Shift that about `target` eigenvalues lie below, from two shifts and their counts."""
-    below, above = (log(max(count + RIGID_MODES, 1)) for _, count in (low, high))
+    below, above = (log(max(count + rigid, 1)) for _, count in (low, high))
     place = (log(target) - below) / (above - below)
     return exp((1.0 - place) * log(low[0]) + place * log(high[0]))
 
 
-def is_amid(inverse: Inverse, requested: int) -> bool:
-    """Whether the shift lies amid the `requested` lowest elastic eigenvalues."""
-    return LEAST * requested <= inverse.negative - RIGID_MODES <= MOST * requested
+def is_amid(inverse: Inverse, requested: int, rigid: int) -> bool:
+    """Whether the shift lies amid the `requested` lowest elastic eigenvalues.
+
+    `rigid` is the number of rigid motions.
+    """
+    return LEAST * requested <= inverse.negative - rigid <= MOST * requested

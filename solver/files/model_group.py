@@ -1,7 +1,5 @@
 """Solids in files: the mesh and its material, from which K and M can be assembled again."""
 
-from typing import Any
-
 import h5py
 import numpy as np
 from numpy.typing import NDArray
@@ -13,23 +11,21 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
-from carillon.fem.model import Damping, ElasticModel, Solid
+from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import at_points
-from carillon.files.datasets import INTEGER, number, read, refused
-from carillon.limits import DENSITIES, EDGES, POISSON
+from carillon.files.datasets import INTEGER, number, put, read, refused
+from carillon.limits import EDGES
+from solver.files.regions_group import (
+    get_regions,
+    get_shared,
+    get_supports,
+    put_regions,
+    put_shared,
+    put_supports,
+)
 
 FINITE_CELLS = "finite_cells"
 """Name of the group of a solid of finite cells."""
-
-
-def put(
-    group: h5py.Group, name: str, data: NDArray[Any], units: str, long_name: str | None = None
-) -> None:
-    """Write one dataset with a checksum, its unit and what it is."""
-    dataset = group.create_dataset(name, data=data, fletcher32=True, chunks=True)
-    dataset.attrs["units"] = units
-    if long_name is not None:
-        dataset.attrs["long_name"] = long_name
 
 
 def put_model(group: h5py.Group, model: Solid) -> None:
@@ -39,10 +35,8 @@ def put_model(group: h5py.Group, model: Solid) -> None:
     put(group, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
     put(group, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
     put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
-    group.attrs["poisson"] = model.poisson
-    group.attrs["density"] = model.density
-    if model.damping is not None:
-        group.attrs["damping"] = model.damping
+    put_regions(group, model.regions, model.region)
+    put_supports(group, model.supports)
     group.attrs["cell_edge"] = mesh.edge
     group.attrs["origin"] = mesh.origin
     if mesh.span is not None and mesh.hanging is not None:
@@ -50,7 +44,9 @@ def put_model(group: h5py.Group, model: Solid) -> None:
         put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
     if isinstance(model, FiniteCellModel):
         put(group, "young", model.young, "Pa", "Young's modulus per voxel")
-        _put_cells(group.create_group(FINITE_CELLS), model.cells)
+        inner = group.create_group(FINITE_CELLS)
+        _put_cells(inner, model.cells)
+        put_shared(inner, model.shared)
     else:
         assert isinstance(model, ElasticModel)
         _put_elements(group, model)
@@ -94,11 +90,10 @@ def get_model(group: h5py.Group) -> Solid:
         mesh,
         at_points(young.astype(float, copy=False)),
         fill,
-        number(group, "poisson", *POISSON),
-        number(group, "density", *DENSITIES),
+        *get_regions(group, (mesh.n_cells, 8)),
         bool(number(group, "lumped", 0.0, 1.0)),
         number(group, "lumped_share", 0.0, 1.0) if "lumped_share" in group.attrs else 0.0,
-        _damping(group),
+        get_supports(group),
     )
 
 
@@ -134,9 +129,9 @@ def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
     return finite_cell_model(
         cells,
         read(group, "young", (mesh.n_cells,)),
-        number(group, "poisson", *POISSON),
-        number(group, "density", *DENSITIES),
-        _damping(group),
+        *get_regions(group, (mesh.n_cells,)),
+        get_shared(inner, cells, group),
+        get_supports(group),
     )
 
 
@@ -169,15 +164,6 @@ def _are_corners(mesh: HexMesh) -> bool:
     if mesh.kinds is not None:
         places = 2 * (mesh.grid[:, None, :] >> 1) + node_places()[mesh.kinds]
     return np.array_equal(mesh.node_grid[cells], places)
-
-
-def _damping(group: h5py.Group) -> Damping | None:
-    if "damping" not in group.attrs:
-        return None
-    pair = np.asarray(group.attrs["damping"])
-    if pair.shape != (2,) or pair.dtype.kind != "f" or not ((pair >= 0.0) & (pair < np.inf)).all():
-        raise refused(group, f"'damping' is {pair.tolist()}, expected two numbers of at least 0")
-    return float(pair[0]), float(pair[1])
 
 
 def _origin(group: h5py.Group) -> Array:

@@ -13,11 +13,11 @@ from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import RIGID_MODES, Solid
-from carillon.files.datasets import find, finite, read, refused
+from carillon.files.datasets import find, finite, put, read, refused
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
 from carillon.records.measurement import measured
-from solver.files.model_group import get_model, put, put_model
+from solver.files.model_group import get_model, put_model
 
 KIND = "modes"
 SCHEMA = 1
@@ -178,14 +178,14 @@ def require_elastic(file: ModesFile, name: str | Path) -> ModesFile:
 
     Raises UserError if there is none, or one at zero frequency.
     """
-    if len(file.eigenvalues) <= RIGID_MODES:
+    rigid = file.model.rigid_modes
+    if len(file.eigenvalues) <= rigid:
         raise UserError(
-            f"{name}: holds {len(file.eigenvalues)} modes, of which {RIGID_MODES} are rigid; "
-            "compute more"
+            f"{name}: holds {len(file.eigenvalues)} modes, of which {rigid} are rigid; compute more"
         )
-    if file.eigenvalues[RIGID_MODES] <= 0.0:
+    if file.eigenvalues[rigid] <= 0.0:
         raise UserError(
-            f"{name}: more than {RIGID_MODES} of its modes have frequency zero, as of a solid that "
+            f"{name}: more than {rigid} of its modes have frequency zero, as of a solid that "
             "hangs on a hinge; repair the mesh and compute them again"
         )
     return file

@@ -12,6 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from carillon.arrays import Array
+from carillon.fem.elasticity import Elasticity
 from carillon.fem.elements import Elements
 from solver.distribution.tree import MergeTree
 from solver.hcms.merge import Group
@@ -29,7 +30,8 @@ class KeptGroups:
     """Subdomains, and merged groups that this rank holds."""
     coefficients: dict[int, tuple[Array, Array]] = field(default_factory=dict)
     """Coefficients of each merged group in the modes of its left and of its right child."""
-    poisson: float | None = None
+    laws: tuple[Elasticity, ...] = ()
+    """Elasticity of its regions."""
 
     def forget(self) -> None:
         """Keep nothing: a synthesis that failed has made some of its groups."""
@@ -44,16 +46,16 @@ class KeptGroups:
         Collective. `elements` are those that touch each subdomain of this rank; the next call
         compares with them.
         """
-        poisson = next(iter(elements.values())).poisson if elements else self.poisson
+        laws = next(iter(elements.values())).regions.laws if elements else self.laws
         same = [
             part
             for part, each in elements.items()
-            if poisson == self.poisson
+            if laws == self.laws
             and part in self.young
             and np.array_equal(each.young, self.young[part])
         ]
         self.young = {part: each.young for part, each in elements.items()}
-        self.poisson = poisson
+        self.laws = laws
         result = {part for parts in comm.allgather(same) for part in parts}
         for merge in tree.merges:
             if merge.left in result and merge.right in result:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
+from carillon.fem.element import rigid_motions
+from carillon.fem.model import RIGID_MODES
 from carillon.processes.petsc import PETSc
 from carillon.processes.threads import in_parallel, split
 from solver.assembly.system import System, distributed_matrix
@@ -90,7 +92,11 @@ class IterativeInverse:
                 return IncompleteCholesky(matrix)
             # The finest level leaves out the shift, which only rigid motions need on coarse ones.
             finest = system.rows.stiffness_products
-            return Multigrid(matrix, self._rigid, system.comm, finest, self._threads)
+            near = self._rigid
+            if system.n_rigid < RIGID_MODES:
+                # A held solid's coarse levels still have to move and turn.
+                near = np.ascontiguousarray(rigid_motions(system.coordinates, np.zeros(3)))
+            return Multigrid(matrix, near, system.comm, finest, self._threads)
         finally:
             matrix.destroy()
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
-from carillon.fem.model import RIGID_MODES
 from carillon.processes.petsc import PETSc
 from solver.assembly.system import System
 from solver.linear.factorisation import count_negative
@@ -66,7 +65,7 @@ def solve_truth(
 ) -> Truth:
     """Compute the `modes` lowest eigenpairs of the assembled system, rigid modes included.
 
-    The six rigid motions are known and deflated.  Of other multiple eigenvalues copies may be
+    The rigid motions are known and deflated.  Of other multiple eigenvalues copies may be
     missed; see `complete`. Raises ConvergenceError if too few pairs converge.
 
     Parameters
@@ -77,7 +76,7 @@ def solve_truth(
         Modes beyond, among which `count_beyond` looks for a gap.
     """
     truth = Truth(*rigid_pairs(system), modes, 0)
-    requested = min(modes + spare, system.n_dofs) - RIGID_MODES
+    requested = min(modes + spare, system.n_dofs) - system.n_rigid
     truth = _with_lowest(system, truth, requested, start_vector(system, seed), tolerance, method)
     few = modes - len(truth.values)
     if few > 0:

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 from mpi4py import MPI
 
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import ElasticModel
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
@@ -114,8 +114,8 @@ def solve_coarsened(
         if reason is None:
             reason = _refine(weighing, solid, estimate, comm)
         if reason is not None:
-            whole = modes.system.gather(np.ascontiguousarray(modes.vectors[:, RIGID_MODES:]))
-            start = FineStart(solid, modes.values[RIGID_MODES:], blocks, whole)
+            whole = modes.system.gather(np.ascontiguousarray(modes.vectors[:, modes.rigid :]))
+            start = FineStart(solid, modes.values[modes.rigid :], blocks, whole)
             coarse = CoarseOrFine(model, modes, steps, None, estimate.errors)
         else:
             modes.destroy()
@@ -130,8 +130,8 @@ def solve_coarsened(
         modes = better
     if solid is not None:
         solid.destroy()
-    none = np.zeros(max(min(LAST, len(modes.values)) - RIGID_MODES, 1))
-    return CoarseOrFine(fine, modes, steps, reason, ExpectedErrors(none))
+    none = np.zeros(max(min(LAST, len(modes.values)) - modes.rigid, 1))
+    return CoarseOrFine(fine, modes, steps, reason, ExpectedErrors(none, modes.rigid))
 
 
 def _weighed(

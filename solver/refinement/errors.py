@@ -12,7 +12,6 @@ from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from solver.coarsening.forest import FOREST
 
-FIRST = RIGID_MODES + 1
 """Number of the first mode whose error is estimated."""
 LAST = 60
 """Number of the last mode whose error is estimated."""
@@ -30,7 +29,7 @@ FINE_BLOCKS, DIVIDED_CELLS = "fine_blocks", "divided_cells"
 
 @dataclass(frozen=True)
 class ExpectedErrors:
-    """Expected relative errors (k,) of the frequencies of modes 7, 8, ... up to `LAST` at most.
+    """Expected relative errors (k,) of the frequencies of elastic modes, up to mode `LAST` at most.
 
     Examples
     --------
@@ -40,6 +39,8 @@ class ExpectedErrors:
     """
 
     errors: Array
+    rigid: int = RIGID_MODES
+    """Number of rigid modes, before the elastic ones."""
 
     @property
     def rms(self) -> float:
@@ -54,12 +55,12 @@ class ExpectedErrors:
     @property
     def worst_mode(self) -> int:
         """Number of the mode that has it, from 1."""
-        return FIRST + int(np.abs(self.errors).argmax())
+        return self.rigid + 1 + int(np.abs(self.errors).argmax())
 
     @property
     def last(self) -> int:
         """Number of the last mode."""
-        return RIGID_MODES + len(self.errors)
+        return self.rigid + len(self.errors)
 
     def excess(self, tolerance: float) -> float:
         """How many times as large as allowed the errors are: their rms, or a third of the worst."""
@@ -71,7 +72,7 @@ class ExpectedErrors:
             f"{prefix}_rms": self.rms,
             f"{prefix}_worst": self.worst,
             f"{prefix}_worst_mode": self.worst_mode,
-            f"{prefix}_modes": [FIRST, self.last],
+            f"{prefix}_modes": [self.rigid + 1, self.last],
         }
 
 

@@ -19,7 +19,7 @@ from carillon.arrays import Array
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import uniform_stiffness
 from carillon.fem.geometry import Blocks, prolongation
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import ElasticModel
 from solver.analysis.coarse_start import prolonged
 from solver.analysis.modes import Modes
 from solver.assembly.sparse import sum_blocks
@@ -28,7 +28,7 @@ from solver.refinement.inverse_iteration import InverseIteration, NearModes
 
 MODES_USED = LAST + 12
 """Number of modes that are compared, since modes may change places."""
-COLUMNS_USED = LAST - RIGID_MODES + 2
+COLUMNS_USED = LAST + 2
 """Number of elastic modes that are iterated. Random vectors beside them find those that are
 missing."""
 NUMBERS_AT_ONCE = 1 << 22
@@ -75,13 +75,13 @@ def estimate_errors(solid: InverseIteration, blocks: Blocks | None, modes: Modes
     >>> estimate.errors.last, estimate.errors.rms > 0.1
     (30, True)
     """
-    values = modes.values[RIGID_MODES:LAST]
+    values = modes.values[modes.rigid : LAST]
     start = modes.start()[:, :COLUMNS_USED]
     whole = modes.system.gather(np.ascontiguousarray(start))
     fine = solid.lowest(values, prolonged(blocks, whole), start.shape[1])
     count = min(len(values), len(fine.values))
     ratio = np.maximum(values[:count], 0.0) / fine.values[:count]
-    return ErrorEstimate(ExpectedErrors(np.sqrt(ratio) - 1.0), fine)
+    return ErrorEstimate(ExpectedErrors(np.sqrt(ratio) - 1.0, modes.rigid), fine)
 
 
 def mean_shares(
@@ -133,8 +133,9 @@ def element_energies(model: ElasticModel, vectors: Array) -> Array:
     """Twice the strain energy (m, k) [J] of each element in displacements (n_dofs, k) [m]."""
     dofs = degrees_of_freedom(model.mesh.cells.astype(np.int64))
     energies = np.empty((len(dofs), vectors.shape[1]))
-    uniform = model.mesh.kinds is None and bool((model.young == model.young[:, :1]).all())
-    kernel = uniform_stiffness(model.poisson)
+    alike = model.mesh.kinds is None and model.region is None and model.supports is None
+    uniform = alike and bool((model.young == model.young[:, :1]).all())
+    kernel = uniform_stiffness(model.regions.laws[0])
     for chosen in _chunks(len(dofs), 24 * (24 + vectors.shape[1])):
         motions = vectors[dofs[chosen]]
         if uniform:

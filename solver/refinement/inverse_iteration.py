@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.geometry import Blocks
-from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.fem.model import ElasticModel
 from solver.analysis.coarse_start import prolonged
 from solver.analysis.modal_solver import ModalSolver, Prepared
 from solver.analysis.options import RANDOM
@@ -113,7 +113,7 @@ class InverseIteration:
             self.inverse.destroy()
         self.inverse = self.prepared.linear.inverse(self.system, shift)
         if shift > 0.0:
-            self._counted = shift, self.inverse.negative - RIGID_MODES
+            self._counted = shift, self.inverse.negative - self.system.n_rigid
 
     def _iterated(self, vectors: Array) -> tuple[Array, Array]:
         assert self.inverse is not None
@@ -161,7 +161,8 @@ class FineStart:
 
     def begin(self, solver: ModalSolver) -> Approximation | None:
         """What an analysis of the fine solid may start from; None if it has no use for it."""
-        requested = solver.options.modes - RIGID_MODES
+        rigid = self.solid.system.n_rigid
+        requested = solver.options.modes - rigid
         if solver.options.method not in RANDOM or solver.options.check_inertia:
             return None
         mesh = solver.local_mesh
@@ -173,7 +174,7 @@ class FineStart:
         inverse = self.solid.inverse
         if solver.local_mesh is not self.prepared.local_mesh or inverse is None:
             inverse = None
-        elif not self.prepared.linear.indefinite or not is_amid(inverse, requested):
+        elif not self.prepared.linear.indefinite or not is_amid(inverse, requested, rigid):
             inverse = None
         else:
             self.solid.inverse = None  # The analysis frees it.

@@ -4,7 +4,7 @@ import numpy as np
 
 from carillon.arrays import Array, Index
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, blocks_with_coarse
-from carillon.fem.model import Constants, ElasticModel
+from carillon.fem.model import ElasticModel
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.model import coarse_model, element_moduli
 
@@ -35,11 +35,6 @@ class RefinedModel:
     ) -> None:
         self.fine = fine
         self._coarsening = coarsening
-        self._constants: Constants = {
-            "poisson": fine.poisson,
-            "density": fine.density,
-            "lumped": fine.lumped,
-        }
         self._plain = blocks_from_mesh(fine.mesh)
         given = None if mesh is None else blocks_with_coarse(fine.mesh, mesh)
         self.is_given = given is not None
@@ -56,7 +51,11 @@ class RefinedModel:
         """The model as it is now."""
         moduli = element_moduli(self.blocks, self.young, self._coarsening)
         return coarse_model(
-            self.blocks, moduli, self._coarsening.lumped_fraction, **self._constants
+            self.blocks,
+            moduli,
+            self._coarsening.lumped_fraction,
+            self.fine.cell_regions,
+            **self.fine.constants,
         )
 
     @property

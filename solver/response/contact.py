@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile
 from solver.response.points import motion_at
 from solver.response.surface import Surface, surface_of
@@ -70,7 +69,8 @@ def _contact(
 def _ruling_modes(truth: ModesFile, surface: Surface) -> tuple[Array, Array]:
     """Their motion (s, 3, k) at the points of the surface, and eigenvalues (k,)."""
     assert truth.modes is not None
-    chosen = slice(RIGID_MODES, RIGID_MODES + RULING_MODES)
+    rigid = truth.model.rigid_modes
+    chosen = slice(rigid, rigid + RULING_MODES)
     modes = np.ascontiguousarray(truth.modes[:, chosen])
     if surface.nodes is None:
         motion = motion_at(truth.model, modes, surface.points)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array, Flags
-from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile
 from solver.response.contact import Contact
 from solver.response.points import motion_at
@@ -67,10 +66,10 @@ def at_contacts(file: ModesFile, contacts: list[Contact]) -> Contacts:
     """
     assert file.modes is not None
     positions = np.array([contact.position for contact in contacts])
-    motion = motion_at(file.model, file.modes[:, RIGID_MODES:], positions)
+    motion = motion_at(file.model, file.modes[:, file.model.rigid_modes :], positions)
     inward = np.array([contact.inward for contact in contacts])
     push = np.einsum("pik,pi->pk", motion, inward)
-    return Contacts(file.eigenvalues[RIGID_MODES:], motion, push)
+    return Contacts(file.eigenvalues[file.model.rigid_modes :], motion, push)
 
 
 def impulse_responses(eigenvalues: Array, damping: Damping, seconds: Array) -> Array:

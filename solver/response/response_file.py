@@ -8,11 +8,11 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import UserError
+from carillon.files.datasets import put
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Point, between
 from carillon.records import provenance
-from solver.files.model_group import put
 from solver.files.modes_file import read_elastic, require_same_solid
 from solver.response.contact import Contact, choose_contacts
 from solver.response.response import (

@@ -60,6 +60,8 @@ class BlockBasis:
 
     def inner(self, vectors: Array) -> Array:
         """Products (size, k) of all basis vectors with `vectors` (local, k); equal on all ranks."""
+        if not self._count:
+            return np.zeros((0, vectors.shape[1]))
         block, lanes = as_lanes(vectors)
         height = self._count * self._width
 
@@ -74,6 +76,8 @@ class BlockBasis:
 
     def remove(self, overlap: Array, vectors: Array) -> None:
         """Subtract the basis vectors times `overlap` (size, k) from `vectors` (local, k)."""
+        if not self._count:
+            return
         block, lanes = as_lanes(vectors)
         spread = np.zeros((self._count * self._width, lanes * LANES))
         spread[self._columns, : vectors.shape[1]] = overlap

@@ -56,10 +56,13 @@ class CountingLaw:
         if young.ndim == 2:
             # Of a cell that is partly void modulus and mass are less.
             young = young.mean(axis=1) / solid.filled.mean(axis=1)
+        poisson = solid.poisson
+        if poisson is None or len(solid.regions) > 1:
+            factor, poisson = _equivalent(solid)
+            young = young * factor
         modulus, share = _regions(mesh.grid, young, size)
         # Slowness squared [s^2/m^2] of a wave of unit stiffness.
         slow = solid.density / modulus
-        poisson = solid.poisson
         shear = 0.5 / (1.0 + poisson)
         pressure = (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
         plate = 1.0 / (1.0 - poisson**2)
@@ -86,6 +89,18 @@ class CountingLaw:
         terms = enumerate(self.terms)
         highest = min(np.log(number / term) / (3 - place) for place, term in terms)
         return float(np.exp(2.0 * brentq(excess, highest - np.log(3.0), highest)))
+
+
+def _equivalent(solid: Solid) -> tuple[Array | float, float]:
+    """Factor (m,) by which moduli of cells become those of isotropic ones of the mean density, as
+    fast for waves, and the mean of their Poisson's ratios."""
+    regions = solid.regions
+    pairs = np.array([law.isotropic_equivalent() for law in regions.laws])
+    factors = pairs[:, 0] * solid.density / regions.density
+    if solid.region is None:
+        return float(factors[0]), float(pairs[0, 1])
+    region = solid.region if solid.region.ndim == 1 else solid.region[:, 0]
+    return factors[region], float(pairs[region, 1].mean())
 
 
 def _regions(grid: NDArray[np.integer], young: Array, size: float) -> tuple[Array, Array]:

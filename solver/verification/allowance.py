@@ -22,7 +22,9 @@ OPERATIONS = 100.0
 entries in a row, of up to 8 cells each, and their errors do not all have one sign."""
 
 
-def accepted_errors(values: Array, rounding: Array, tolerance: float) -> Array:
+def accepted_errors(
+    values: Array, rounding: Array, tolerance: float, rigid: int = RIGID_MODES
+) -> Array:
     """Accepted errors e (k,) [rad^2/s^2] of the elastic eigenvalues, 0 of the rigid ones.
 
     Parameters
@@ -35,7 +37,7 @@ def accepted_errors(values: Array, rounding: Array, tolerance: float) -> Array:
         Relative error of an eigenvalue that is accepted but for rounding.
     """
     errors = values * (tolerance + OPERATIONS * rounding)
-    errors[:RIGID_MODES] = 0.0
+    errors[:rigid] = 0.0
     return np.asarray(errors)
 
 
@@ -44,7 +46,7 @@ def orthogonality_limit(unknowns: int) -> float:
     return ORTHOGONALITY_TOLERANCE + float(np.finfo(float).eps) * unknowns
 
 
-def residual_limits(values: Array, errors: Array) -> Array:
+def residual_limits(values: Array, errors: Array, rigid: int = RIGID_MODES) -> Array:
     """Largest `ModesEvidence.energy_residuals` (k,) that accepted `errors` allow.
 
     |r|_(K + s M)^-1 <= sqrt(2 E_i), here over sqrt(lambda_i).
@@ -55,11 +57,13 @@ def residual_limits(values: Array, errors: Array) -> Array:
     >>> residual_limits(values, 1e-6 * values)[6:].round(5)
     array([0.00141, 0.00158])
     """
-    scale = np.maximum(values, values[RIGID_MODES])
+    scale = np.maximum(values, values[rigid])
     return np.asarray(np.sqrt(2.0 * np.cumsum(errors) / scale))
 
 
-def angle_limits(values: Array, errors: Array, groups: Sequence[tuple[int, int]]) -> Array:
+def angle_limits(
+    values: Array, errors: Array, groups: Sequence[tuple[int, int]], rigid: int = RIGID_MODES
+) -> Array:
     """Largest angles (g,) [rad] of clusters of modes a..b, numbered from 1, to the exact ones.
 
     sin^2 <= E_b / (lambda_(b+1) - lambda_b) + E_(a-1) / (lambda_a - lambda_(a-1)).
@@ -74,7 +78,7 @@ def angle_limits(values: Array, errors: Array, groups: Sequence[tuple[int, int]]
     limits = np.empty(len(groups))
     for index, (first, last) in enumerate(groups):
         square = total[last - 1] / (values[last] - values[last - 1])
-        if first > RIGID_MODES + 1:
+        if first > rigid + 1:
             square += total[first - 2] / (values[first - 1] - values[first - 2])
         limits[index] = np.arcsin(min(1.0, np.sqrt(square)))
     return limits

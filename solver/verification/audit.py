@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES
 from carillon.files.paths import by_stem
 from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.files.modes_file import ModesFile, frequencies, read_modes
@@ -68,24 +67,26 @@ def audit(file: ModesFile, tolerance: float = EIGENVALUE_TOLERANCE) -> Audit:
 def faults(file: ModesFile, evidence: ModesEvidence, tolerance: float) -> list[str]:
     """A sentence for each fault of a modes file, whose eigenvalues were asked for to a `tolerance`.
 
-    Solids that hang on hinges have more than six rigid motions, which is no fault of the modes.
+    Solids that hang on hinges have more rigid motions than they should, which is no fault of the
+    modes.
     """
     sentences = []
     if evidence.counted is not None and evidence.counted != evidence.expected:
         missing = evidence.counted - evidence.expected
         things = "1 eigenvalue is" if abs(missing) == 1 else f"{abs(missing):,} eigenvalues are"
         sentences.append(f"{things} {'missing' if missing > 0 else 'too many'}")
-    if evidence.rigid_modes < RIGID_MODES:
-        sentences.append(f"{evidence.rigid_modes} of {RIGID_MODES} rigid motions are there")
+    rigid = file.model.rigid_modes
+    if evidence.rigid_modes < rigid:
+        sentences.append(f"{evidence.rigid_modes} of {rigid} rigid motions are there")
     limit = orthogonality_limit(evidence.unknowns)
     if evidence.orthogonality > limit:
         sentences.append(
             f"modes are orthonormal to {evidence.orthogonality:.1e}, {limit:.1e} is required"
         )
     values, residuals = file.eigenvalues, np.array(evidence.energy_residuals)
-    errors = accepted_errors(values, np.array(evidence.rounding), ACCEPTED * tolerance)
-    allowed = residual_limits(values, errors)
-    over = np.flatnonzero(residuals[RIGID_MODES:] > allowed[RIGID_MODES:]) + RIGID_MODES
+    errors = accepted_errors(values, np.array(evidence.rounding), ACCEPTED * tolerance, rigid)
+    allowed = residual_limits(values, errors, rigid)
+    over = np.flatnonzero(residuals[rigid:] > allowed[rigid:]) + rigid
     if len(over):
         worst = over[np.argmax(residuals[over] / allowed[over])]
         modes = "1 mode has" if len(over) == 1 else f"{len(over):,} modes have"

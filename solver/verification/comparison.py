@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from carillon.arrays import Array
 from carillon.fem.geometry import blocks_with_coarse, prolongation
-from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
+from carillon.fem.model import ElasticModel, Solid
 from carillon.files.paths import by_stem
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
@@ -108,23 +108,23 @@ def _compared(
     candidate: str, a: ModesFile, truth: str, b: ModesFile, M: sp.csr_matrix
 ) -> SpectrumComparison:
     assert a.modes is not None
-    count = min(len(a.eigenvalues), len(b.eigenvalues))
-    elastic = slice(RIGID_MODES, count)
+    count, rigid = min(len(a.eigenvalues), len(b.eigenvalues)), b.model.rigid_modes
+    elastic = slice(rigid, count)
     values, exact = a.eigenvalues[elastic], b.eigenvalues[elastic]
     shift = a.frequencies[elastic] / b.frequencies[elastic] - 1.0
-    audible = frequency_errors(shift, AUDIBLE_LAST)
+    audible = frequency_errors(shift, AUDIBLE_LAST, rigid)
     modes = on_mesh_of(b, a)
     angles = _cluster_angles(modes, b, M, count)
     return SpectrumComparison(
         candidate,
         truth,
         eigenvalue_errors(values, exact),
-        frequency_errors(shift, count).rms,
+        frequency_errors(shift, count, rigid).rms,
         audible.rms,
         abs(audible.worst),
         max((cluster["angle"] for cluster in angles), default=float("nan")),
-        float(recomputed_residuals(*assembled(a.model), a.eigenvalues, a.modes).max()),
-        count - RIGID_MODES,
+        float(recomputed_residuals(*assembled(a.model), a.eigenvalues, a.modes, rigid).max()),
+        count - rigid,
         angles,
         None if modes is a.modes else _matched(modes, a, b, M),
         material_difference(a.model, b.model),
@@ -137,16 +137,17 @@ def _matched(modes: Array, a: ModesFile, b: ModesFile, M: sp.csr_matrix) -> dict
     Modes of a cluster of either are compared as a space, and matched in their order.
     """
     assert b.modes is not None
-    others = modes[:, RIGID_MODES:]
+    rigid = b.model.rigid_modes
+    others = modes[:, rigid:]
     # A partner for each mode of the truth, or for as many as the candidate has.
-    elastic = slice(RIGID_MODES, min(len(b.eigenvalues), len(a.eigenvalues)))
+    elastic = slice(rigid, min(len(b.eigenvalues), len(a.eigenvalues)))
     exact = b.modes[:, elastic]
-    rows, columns = clusters(b.eigenvalues[elastic]), clusters(a.eigenvalues[RIGID_MODES:])
+    rows, columns = clusters(b.eigenvalues[elastic]), clusters(a.eigenvalues[rigid:])
     matching = match_clusters(mode_overlaps(exact, others, M @ others), rows, columns)
-    errors = a.frequencies[RIGID_MODES:][matching.partners] / b.frequencies[elastic] - 1.0
+    errors = a.frequencies[rigid:][matching.partners] / b.frequencies[elastic] - 1.0
     moved = matching.partners != np.arange(len(errors))
     return {
-        **recognised(errors, matching.overlaps),
+        **recognised(errors, matching.overlaps, rigid),
         "moved": int((moved & (matching.overlaps >= SAME)).sum()),
         "overlap_median": float(np.median(matching.overlaps)),
     }
@@ -157,15 +158,16 @@ def _cluster_angles(
 ) -> list[dict[str, Any]]:
     """Angle of every cluster of `b` but the last to the same `modes` on its mesh."""
     assert b.modes is not None
-    elastic = slice(RIGID_MODES, count)
+    rigid = b.model.rigid_modes
+    elastic = slice(rigid, count)
     groups = clusters(b.eigenvalues[elastic])[:-1]
     if not groups:
         return []
     angles = subspace_angles(modes[:, elastic], b.modes[:, elastic], M, groups)
     return [
         {
-            "first": RIGID_MODES + 1 + group.start,
-            "last": RIGID_MODES + group.stop,
+            "first": rigid + 1 + group.start,
+            "last": rigid + group.stop,
             "angle": float(angle),
         }
         for group, angle in zip(groups, angles, strict=True)
@@ -202,16 +204,19 @@ def material_difference(one: Solid, truth: Solid) -> dict[str, Any] | None:
 
     Young's moduli are compared on one mesh alone, since a coarse element has moduli of its own.
     Returns of what differs: `poisson` and `density_kg_per_m3`, each with the solid's own value and
-    the truth's, and `young`: the number of `cells` that differ, that of `all`, and the `largest`
-    relative difference (infinite from zero).
+    the truth's; `elasticity` of several materials or anisotropic ones, the names of both; and
+    `young`: the number of `cells` that differ, that of `all`, and the `largest` relative difference
+    (infinite from zero).
     """
     differing: dict[str, Any] = {}
     for name, a, b in (
         ("poisson", one.poisson, truth.poisson),
         ("density_kg_per_m3", one.density, truth.density),
     ):
-        if abs(a - b) > EQUAL * abs(b):
+        if a is not None and b is not None and abs(a - b) > EQUAL * abs(b):
             differing[name] = [float(a), float(b)]
+    if one.regions.laws != truth.regions.laws and "poisson" not in differing:
+        differing["elasticity"] = [list(each.regions.names) for each in (one, truth)]
     if on_one_mesh(one, truth) and one.young.shape == truth.young.shape:
         step = np.abs(one.young - truth.young)
         other = step > EQUAL * np.abs(truth.young)

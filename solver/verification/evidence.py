@@ -77,20 +77,21 @@ def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:
     assert file.modes is not None
     values, modes = file.eigenvalues, file.modes
     K, M = assembled(file.model)
+    rigid = file.model.rigid_modes
     with np.errstate(all="ignore"):  # judged below
-        residuals = recomputed_residuals(K, M, values, modes)
+        residuals = recomputed_residuals(K, M, values, modes, rigid)
         gram = modes.T @ (M @ modes)
     if not (np.isfinite(residuals).all() and np.isfinite(gram).all()):
         raise ArithmeticError("residuals or products of the modes are not finite numbers")
-    value, expected = gap_below_last(values, max(GAP, GAP_OF_TOLERANCE * tolerance))
+    value, expected = gap_below_last(values, max(GAP, GAP_OF_TOLERANCE * tolerance), rigid)
     return ModesEvidence(
         len(values),
         file.mesh.n_dofs,
         float(residuals.max()),
         float(np.median(residuals)),
-        _energy_residuals(K, M, values, modes, residuals).tolist(),
-        _rounding(K, values, modes).tolist(),
-        _quotient_errors(K, values, modes, gram).tolist(),
+        _energy_residuals(K, M, values, modes, residuals, rigid).tolist(),
+        _rounding(K, values, modes, rigid).tolist(),
+        _quotient_errors(K, values, modes, gram, rigid).tolist(),
         float(np.abs(gram - np.eye(len(gram))).max()),
         _count_rigid(file, K),
         value,
@@ -101,12 +102,12 @@ def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:
 
 
 def _energy_residuals(
-    K: sp.csr_matrix, M: sp.csr_matrix, values: Array, modes: Array, ratios: Array
+    K: sp.csr_matrix, M: sp.csr_matrix, values: Array, modes: Array, ratios: Array, rigid: int
 ) -> Array:
     result = ratios.copy()
     largest = np.argsort(ratios)[-FEWEST_SOLVED:]
     columns = np.union1d(np.flatnonzero(ratios > NEGLIGIBLE), largest)
-    scale = residual_scale(values)
+    scale = residual_scale(values, rigid)
     matrix = distributed_matrix((K + values[-1] * M).tocsr(), MPI.COMM_SELF)
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     factorisation = factorised(matrix, {})
@@ -123,8 +124,10 @@ def _energy_residuals(
     return result
 
 
-def _quotient_errors(K: sp.csr_matrix, values: Array, modes: Array, gram: Array) -> Array:
-    elastic = slice(RIGID_MODES, None)
+def _quotient_errors(
+    K: sp.csr_matrix, values: Array, modes: Array, gram: Array, rigid: int
+) -> Array:
+    elastic = slice(rigid, None)
     modes = modes[:, elastic]
     errors = np.zeros(len(values))
     quotients = np.einsum("ik,ik->k", modes, K @ modes) / np.diag(gram)[elastic]
@@ -132,13 +135,13 @@ def _quotient_errors(K: sp.csr_matrix, values: Array, modes: Array, gram: Array)
     return errors
 
 
-def _rounding(K: sp.csr_matrix, values: Array, modes: Array) -> Array:
+def _rounding(K: sp.csr_matrix, values: Array, modes: Array, rigid: int) -> Array:
     size, weight = abs(K), np.empty(len(values))
     for start in range(0, len(weight), COLUMNS_AT_ONCE):
         few = slice(start, start + COLUMNS_AT_ONCE)
         part = np.abs(modes[:, few])
         weight[few] = np.einsum("ij,ij->j", part, size @ part)
-    return np.asarray(np.finfo(float).eps * weight / residual_scale(values))
+    return np.asarray(np.finfo(float).eps * weight / residual_scale(values, rigid))
 
 
 def _count_rigid(file: ModesFile, K: sp.csr_matrix) -> int:
@@ -152,7 +155,7 @@ def _count_rigid(file: ModesFile, K: sp.csr_matrix) -> int:
     return count_rigid(file.eigenvalues, scales, estimate)
 
 
-def gap_below_last(values: Array, gap: float = GAP) -> tuple[float, int]:
+def gap_below_last(values: Array, gap: float = GAP, rigid: int = RIGID_MODES) -> tuple[float, int]:
     """Middle of the last gap between ascending values that is wide, or else of the widest one.
 
     Returns the value in the gap, and how many of the `values` are below it.
@@ -162,11 +165,11 @@ def gap_below_last(values: Array, gap: float = GAP) -> tuple[float, int]:
     >>> gap_below_last(np.array([0.0] * 6 + [1.0, 2.0, 5.0, 5.00001]))
     (3.5, 8)
     """
-    if len(values) <= RIGID_MODES + 1:
+    if len(values) <= rigid + 1:
         return float(values[-1] * (1.0 + 1e-6)), len(values)
-    gaps = np.diff(values[RIGID_MODES:]) / values[RIGID_MODES + 1 :]
+    gaps = np.diff(values[rigid:]) / values[rigid + 1 :]
     wide = np.flatnonzero(gaps > gap)
-    below = RIGID_MODES + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
+    below = rigid + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
     return float(0.5 * (values[below - 1] + values[below])), below
 
 

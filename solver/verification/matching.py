@@ -98,12 +98,12 @@ def match_clusters(overlaps: Array, rows: list[slice], columns: list[slice]) -> 
     return Matching(partners, paired, joined.max(axis=1))
 
 
-def recognised(errors: Array, overlaps: Array) -> dict[str, Any]:
+def recognised(errors: Array, overlaps: Array, rigid: int = RIGID_MODES) -> dict[str, Any]:
     """Number of modes that overlap their partner by `SAME`, and rms and worst of their errors.
 
     A partner of another shape, which a mode gets that the other solution lacks, has a frequency of
-    its own, and says nothing. `errors` and `overlaps` (k,) are those of the partners of modes 7, 8,
-    ...: of the frequencies, relative, and of the shapes.
+    its own, and says nothing. `errors` and `overlaps` (k,) are those of the partners of elastic
+    modes: of the frequencies, relative, and of the shapes.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def recognised(errors: Array, overlaps: Array) -> dict[str, Any]:
         "modes": len(modes),
         "rms": float(np.sqrt(np.mean(errors**2))),
         "worst": float(errors[worst]),
-        "worst_mode": RIGID_MODES + 1 + int(modes[worst]),
+        "worst_mode": rigid + 1 + int(modes[worst]),
     }
 
 
@@ -161,20 +161,20 @@ class FrequencyErrors:
     """The error of largest magnitude, with its sign, and the mode that has it."""
 
 
-def frequency_errors(errors: Array, last: int) -> FrequencyErrors:
-    """Summary of the relative `errors` (k,) of modes 7, 8, ... up to `last`, if there are so many.
+def frequency_errors(errors: Array, last: int, rigid: int = RIGID_MODES) -> FrequencyErrors:
+    """Summary of the relative `errors` (k,) of elastic modes, as far as mode `last`.
 
     Examples
     --------
     >>> frequency_errors(np.array([0.25, -0.5, 1.0]), last=8)
     FrequencyErrors(first=7, last=8, rms=0.395..., mean=-0.125, worst=-0.5, worst_mode=8)
     """
-    part = errors[: last - RIGID_MODES]
+    part = errors[: last - rigid]
     worst = int(np.argmax(np.abs(part)))
-    first = RIGID_MODES + 1
+    first = rigid + 1
     return FrequencyErrors(
         first,
-        RIGID_MODES + len(part),
+        rigid + len(part),
         float(np.sqrt(np.mean(part**2))),
         float(np.mean(part)),
         float(part[worst]),

@@ -36,7 +36,7 @@ def verify(system: System, values: Array, vectors: Array) -> tuple[Array, float]
 
     Products are taken with the assembled matrices, of few columns at a time.
     """
-    scale = residual_scale(values)
+    scale = residual_scale(values, system.n_rigid)
     ratios = np.empty(len(values))
     worst = 0.0
     for start in range(0, len(values), COLUMNS_AT_ONCE):
@@ -60,17 +60,19 @@ def residual_ratios(
     return np.asarray(norms / np.maximum(scale * mass_norms, np.finfo(float).tiny))
 
 
-def recomputed_residuals(K: sp.csr_matrix, M: sp.csr_matrix, values: Array, modes: Array) -> Array:
+def recomputed_residuals(
+    K: sp.csr_matrix, M: sp.csr_matrix, values: Array, modes: Array, rigid: int = RIGID_MODES
+) -> Array:
     """Residual ratios (k,) of modes (n_dofs, k) by matrices that were assembled anew."""
     mass_modes = M @ modes
     residual = K @ modes - mass_modes * values
-    scale = residual_scale(values) * np.linalg.norm(mass_modes, axis=0)
+    scale = residual_scale(values, rigid) * np.linalg.norm(mass_modes, axis=0)
     return np.asarray(np.linalg.norm(residual, axis=0) / scale)
 
 
-def residual_scale(values: Array) -> Array:
+def residual_scale(values: Array, rigid: int = RIGID_MODES) -> Array:
     """What residuals are measured with: each eigenvalue, the first elastic one for rigid modes."""
-    return np.maximum(values, values[RIGID_MODES])
+    return np.maximum(values, values[min(rigid, len(values) - 1)])
 
 
 def rigid_modes(system: System, values: Array, vectors: Array) -> int:
@@ -117,10 +119,11 @@ def require_orthonormal(orthogonality: float) -> None:
         )
 
 
-def require_six_rigid(count: int) -> None:
-    """Raise ConvergenceError unless `count` is the number of a connected free body's."""
-    if count != RIGID_MODES:
+def require_rigid(count: int, expected: int = RIGID_MODES) -> None:
+    """Raise ConvergenceError unless `count` is the `expected` number of rigid modes."""
+    if count != expected:
+        body = "a connected free body" if expected == RIGID_MODES else "the body as it is held"
         raise ConvergenceError(
-            f"{count} zero-frequency modes found, a connected free body has {RIGID_MODES}; part of "
+            f"{count} zero-frequency modes found, {body} has {expected}; part of "
             "the model hangs on a hinge or has almost no stiffness"
         )

@@ -13,6 +13,7 @@ from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.finite_cells.shapes import strain_factors
 from carillon.fem.geometry import HexMesh, blocks_from_mesh
 from carillon.fem.model import Constants, Solid, fine_model
+from carillon.fem.regions import Regions
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
@@ -58,7 +59,7 @@ def analysed_elements(
     """Elements of a solid by its options: finite cells with its voxels, voxels, or blocks of a
     coarsening.
     """
-    constants: Constants = {"poisson": options.poisson, "density": options.density}
+    constants: Constants = {"regions": Regions.one(options.poisson, options.density)}
     if cells is not None:
         return _CellElements(cells, constants)
     coarsening = options.coarsening()
@@ -117,7 +118,7 @@ class _CellElements(AnalysedElements):
     def __init__(self, cells: FiniteCells, constants: Constants) -> None:
         self._cells = cells
         ones = np.ones(cells.mesh.n_cells)
-        self.model = finite_cell_model(cells, ones, constants["poisson"], constants["density"])
+        self.model = finite_cell_model(cells, ones, constants["regions"])
 
     def slopes(self, young: Array, directions: Array) -> Array:
         columns = [self._cells.point_values(along).ravel() for along in directions.T]

@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
-from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
+from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.processes.threads import one_thread
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
@@ -76,8 +76,8 @@ class FineSolid:
             self._last = fine.modes
             hertz, coarse = frequencies(fine.eigenvalues), frequencies(evaluation.eigenvalues)
             order = self._shapes.order(
-                self._coarse.mesh_rows(evaluation.modes.vectors[:, RIGID_MODES:]),
-                simulation.mesh_rows(fine.modes.vectors[:, RIGID_MODES:]),
+                self._coarse.mesh_rows(evaluation.modes.elastic),
+                simulation.mesh_rows(fine.modes.elastic),
             )
             cost = cost_of(setting.objective, setting.material, fine)
         balance = setting.objective.balance
@@ -95,18 +95,16 @@ def fine_frequencies(design: Design) -> FineFrequencies:
     if not is_coarsened(design):
         return FineFrequencies(design.coarse_frequencies, np.arange(count))
     mesh = hexmesh_from_grid(design.fine_grid, design.fine_origin, design.fine_edge)
-    model = fine_model(
-        mesh, design.young, poisson=design.model.poisson, density=design.model.density
-    )
-    options = SolverOptions(modes=RIGID_MODES + count, tolerance=FINE_TOLERANCE)
+    model = fine_model(mesh, design.young, regions=design.model.regions)
+    options = SolverOptions(modes=model.rigid_modes + count, tolerance=FINE_TOLERANCE)
     solver = ModalSolver(model, options, MPI.COMM_SELF)
     modes = solver.solve()
     rows = np.empty_like(modes.vectors)
     rows[degrees_of_freedom(solver.local_mesh.nodes)] = modes.vectors
     order = ShapeMatch(design.model, model).order(
-        design.modes[:, RIGID_MODES:], rows[:, RIGID_MODES:]
+        design.modes[:, model.rigid_modes :], rows[:, model.rigid_modes :]
     )
-    return FineFrequencies(frequencies(modes.values[RIGID_MODES:]), order)
+    return FineFrequencies(frequencies(modes.values[modes.rigid :]), order)
 
 
 def is_coarsened(design: Design) -> bool:

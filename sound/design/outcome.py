@@ -20,6 +20,7 @@ from scipy.optimize import nnls
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import HexMesh
+from carillon.fem.regions import Regions
 from carillon.limits import DENSITIES
 from carillon.processes.threads import one_thread
 from solver.distribution.partition import partition_cells
@@ -150,8 +151,8 @@ class Outcome:
             targets=targets,
             coordinates=evaluation.z,
             young=young,
-            model=simulation.elements.with_young(young).with_constants(
-                simulation.poisson(evaluation.z), heavier * density
+            model=simulation.elements.with_young(young).with_regions(
+                Regions.one(simulation.poisson(evaluation.z), heavier * density)
             ),
             eigenvalues=stretch**2 * evaluation.modes.values,
             modes=simulation.mesh_rows(evaluation.modes.vectors) / np.sqrt(heavier),

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +14,7 @@ from carillon.errors import ConvergenceError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
@@ -84,7 +85,7 @@ class Simulation:
         self.elements = analysed_elements(mesh, options, cells)
         self.modes = modes
         self.evaluations = 0
-        analysis = SolverOptions(modes=RIGID_MODES + modes, tolerance=tolerance)
+        analysis = SolverOptions(modes=self.model.rigid_modes + modes, tolerance=tolerance)
         self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
@@ -105,11 +106,11 @@ class Simulation:
         self.evaluations += 1
         young = self.material.moduli(z)
         modes = self.elements.solve(self.solver, young, start, self.material.poisson(z))
-        elastic = modes.vectors[:, RIGID_MODES:]
+        elastic = modes.elastic
         similar = start.inverse if isinstance(start, Modes) else None
         own = None if modes.inverse is similar else modes.inverse
         pushed = self._pushes.T @ elastic
-        evaluation = Evaluation(z, modes.values[RIGID_MODES:], pushed, modes, inverse=own)
+        evaluation = Evaluation(z, modes.values[modes.rigid :], pushed, modes, inverse=own)
         return self.differentiate(evaluation) if derivatives else evaluation
 
     def evaluate_anyway(self, z: Array, start: Modes | None) -> Evaluation:
@@ -137,7 +138,7 @@ class Simulation:
 
     def _sensitivity(self, evaluation: Evaluation, inverse: Inverse, whole: bool) -> Sensitivity:
         young = self.material.moduli(evaluation.z)
-        elastic = np.ascontiguousarray(evaluation.modes.vectors[:, RIGID_MODES:])
+        elastic = np.ascontiguousarray(evaluation.modes.elastic)
         directions = self.material.slopes(young)[:, None] * self.material.basis
         slopes = self.elements.slopes(young, directions)
         values = evaluation.eigenvalues
@@ -159,7 +160,7 @@ class Simulation:
     def poisson(self, z: Array) -> float:
         """Poisson's ratio at the coordinates z."""
         own = self.material.poisson(z)
-        return self.model.poisson if own is None else own
+        return cast(float, self.model.poisson) if own is None else own
 
     def _with_slope_of_poisson(
         self, z: Array, strains: Array, slopes: Array
@@ -192,7 +193,7 @@ class Simulation:
         """
         young = self.material.moduli(evaluation.z)
         own = young[:, None] * (regions[:, None] == np.arange(regions.max() + 1))
-        vectors = self.mesh_rows(evaluation.modes.vectors[:, RIGID_MODES:])
+        vectors = self.mesh_rows(evaluation.modes.elastic)
         count = vectors.shape[1]
         energies, _ = projected_stiffness(
             self.model.connectivity,

@@ -5,11 +5,12 @@ from typing import Any
 
 import h5py
 
+from carillon.fem.embedding import embedding
 from carillon.fem.model import ElasticModel
+from carillon.files.datasets import put
 from solver.assembly.sparse import assembled
-from solver.files.model_group import FINITE_CELLS, put
+from solver.files.model_group import FINITE_CELLS
 from solver.files.modes_file import write_modes
-from solver.response.points import embedding
 from solver.verification.residuals import recomputed_residuals
 from sound.project.design import Design
 from sound.project.design_file import put_object

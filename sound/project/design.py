@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Integers
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
+from carillon.fem.model import ElasticModel, Solid
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.strikes import Strike
@@ -104,12 +104,12 @@ class Design:
     @property
     def coarse_frequencies(self) -> Array:
         """Frequencies (N,) [Hz] of the elastic modes of the coarse solid."""
-        return frequencies(self.eigenvalues[RIGID_MODES:])
+        return frequencies(self.eigenvalues[self.model.rigid_modes :])
 
     @property
     def elastic_modes(self) -> Array:
         """Elastic modes (n_dofs, N) [kg^-1/2] in the order of `frequencies`, on coarse nodes."""
-        elastic = self.modes[:, RIGID_MODES:]
+        elastic = self.modes[:, self.model.rigid_modes :]
         return elastic if self.fine is None else elastic[:, self.fine.order]
 
     @property
@@ -149,7 +149,7 @@ def fault(design: Design) -> str:
         return said
     targets = design.targets
     T, N = len(targets.names), len(targets.frequencies)
-    kept, cells = RIGID_MODES + N, design.model.mesh.n_cells
+    kept, cells = design.model.rigid_modes + N, design.model.mesh.n_cells
     points = (8,) if isinstance(design.model, ElasticModel) else ()
     expected: list[tuple[str, Any, tuple[int | None, ...]]] = [
         ("strikes", design.strikes, (T,)),

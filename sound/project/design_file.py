@@ -8,10 +8,11 @@ import h5py
 import numpy as np
 
 from carillon.errors import UserError
+from carillon.files.datasets import put
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
 from carillon.records.measurement import measured
-from solver.files.model_group import get_model, put, put_model
+from solver.files.model_group import get_model, put_model
 from solver.files.modes_file import put_eigenvalues, put_modes
 from sound.clips.targets import Targets
 from sound.project.design import (

@@ -7,6 +7,7 @@ from carillon.parameters.quantities import (
     File,
     Pair,
     Point,
+    ShownName,
     WorkersAnywhere,
     YoungsModulus,
     between,
@@ -16,22 +17,12 @@ LEAST_WEIGHT = 1e-12
 """Weight of frequencies or of amplitudes below which a search has nothing to lower."""
 
 
-def _printable(name: str) -> str:
-    if name.isspace() or not name.isprintable():
-        raise ValueError(
-            f"found {name!r}, expected characters that can be printed, and not blanks alone"
-        )
-    return name
-
-
 def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
     if not bounds[0] < bounds[1]:
         raise ValueError(f"found {list(bounds)}, expected the lower one first")
     return bounds
 
 
-ShownName = Annotated[str, Within(min_length=1, max_length=100), Check(_printable)]
-"""A name that messages and pages show."""
 ModeCount = Annotated[int, between(1, 10_000)]
 Dampings = Annotated[str, OneOf("clips", "material")]
 """Where dampings of a design come from."""

@@ -9,7 +9,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from solver.files.modes_file import ModesFile
 from solver.response.points import motion_at
 from solver.response.response import Damping
@@ -53,7 +53,8 @@ class SoundingSolid:
         Its eigenvalues (k,) [rad^2/s^2] and modes (n_dofs, k) [kg^-1/2] ascend, those of the rigid
         motions first.  Raises UserError if none is left.
         """
-        values = eigenvalues[RIGID_MODES:]
+        rigid = model.rigid_modes
+        values = eigenvalues[rigid:]
         decay = damping.decay_per_second(values)
         square = values - decay**2
         kept = np.flatnonzero(square > 0.0)
@@ -63,7 +64,7 @@ class SoundingSolid:
                 "compute more or lower the damping"
             )
         hertz = np.sqrt(square[kept]) / (2.0 * np.pi)
-        return cls(hertz, decay[kept], model, modes[:, RIGID_MODES + kept])
+        return cls(hertz, decay[kept], model, modes[:, rigid + kept])
 
     @classmethod
     def of_truth(cls, file: ModesFile, design: Design) -> SoundingSolid:
@@ -74,14 +75,14 @@ class SoundingSolid:
         object.
         """
         assert file.modes is not None
-        count = len(design.frequencies)
-        if len(file.frequencies) < RIGID_MODES + count:
+        count, rigid = len(design.frequencies), file.model.rigid_modes
+        if len(file.frequencies) < rigid + count:
             raise UserError(
-                f"found {len(file.frequencies)} modes, expected {RIGID_MODES} rigid and {count} "
-                f"elastic ones as in the design; compute {RIGID_MODES + count}"
+                f"found {len(file.frequencies)} modes, expected {rigid} rigid and {count} "
+                f"elastic ones as in the design; compute {rigid + count}"
             )
         _require_same_object(file.mesh, design.model.mesh)
-        kept = slice(RIGID_MODES, RIGID_MODES + count)
+        kept = slice(rigid, rigid + count)
         return cls(file.frequencies[kept], design.dampings, file.model, file.modes[:, kept])
 
     def motion(self, positions: Array) -> Array:

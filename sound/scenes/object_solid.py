@@ -62,7 +62,7 @@ def object_solid(entry: ObjectEntry) -> ObjectSolid:
     if entry.design is not None:
         return _of_design(entry.design)
     if entry.modes is not None:
-        return _of_modes(entry.modes, entry.heard_modes, entry.made_of.damping)
+        return _of_modes(entry.modes, entry.heard_modes, _damping(entry))
     if entry.radius is not None:
         return _of_ball(entry, entry.radius)
     assert entry.mesh is not None
@@ -77,7 +77,7 @@ def _of_design(path: str) -> ObjectSolid:
         design.surface_vertices,
         design.surface_faces,
         design.young_near(design.surface_vertices),
-        design.model.poisson,
+        design.model.regions.mean_poisson,
         sounding,
         design.settings.get("mesh", ""),
         Listening.of_design(design, sounding),
@@ -101,7 +101,7 @@ def _of_modes(path: str, heard_path: str | None, damping: Damping) -> ObjectSoli
         vertices,
         faces,
         _young_near(file.model, vertices),
-        file.model.poisson,
+        file.model.regions.mean_poisson,
         SoundingSolid.of_modes(heard, damping),
         file.attributes.get("mesh", ""),
         accuracy=accuracy or None,
@@ -147,7 +147,7 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     if entry.count:
         ball, factor = _uniform(sphere, entry, radius)
         radius *= factor
-        sounding, accuracy = ball.sounding(entry.made_of.damping), ball.accuracy
+        sounding, accuracy = ball.sounding(_damping(entry)), ball.accuracy
     sphere.apply_scale(radius)
     mass = 4.0 / 3.0 * np.pi * radius**3 * entry.made_of.density
     moments = np.full(3, 0.4 * mass * radius**2)
@@ -181,7 +181,7 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
         np.asarray(surface.faces),
         np.full(len(surface.vertices), entry.made_of.young),
         entry.made_of.poisson,
-        solid.sounding(entry.made_of.damping),
+        solid.sounding(_damping(entry)),
         mesh,
         accuracy=solid.accuracy if entry.count else None,
     )
@@ -195,3 +195,7 @@ def _uniform(surface: Surface, entry: ObjectEntry, size: float) -> tuple[Uniform
     )
     solid = uniform_solid(surface, entry.name, how)
     return solid.sized(size, material.young, material.density, entry.pitch)
+
+
+def _damping(entry: ObjectEntry) -> Damping:
+    return Damping(entry.made_of.alpha, entry.made_of.beta)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.composition.materials import NamedMaterial, named_material
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.documents import parameters_from, read_parameters
@@ -18,12 +19,11 @@ from carillon.parameters.quantities import (
     MetresPerUnit,
     Pair,
     Resolution,
+    ShownName,
     Triple,
     between,
 )
 from carillon.parameters.sentences import ParameterError
-from sound.project.settings import ShownName
-from sound.scenes.materials import NamedMaterial, named_material
 
 SOURCES = ("design", "modes", "mesh", "radius")
 """What an object may be, one of them."""

@@ -22,6 +22,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid, fine_model
+from carillon.fem.regions import Regions
 from carillon.files.cache import remembered
 from carillon.processes.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
@@ -76,7 +77,7 @@ class UniformSolid:
         stiffer, denser = young / YOUNG, density / DENSITY
         model = _resized(self.model, size)
         model = model.with_young(np.full(model.mesh.n_cells, young))
-        model = model.with_constants(model.poisson, density)
+        model = model.with_regions(self.model.regions.scaled(denser, stiffer))
         if self.eigenvalues is None or self.modes is None:
             return replace(self, model=model)
         return UniformSolid(
@@ -163,12 +164,12 @@ def _model(surface: Surface, name: str, how: Discretised, discretisation: str) -
 
         cells = finite_cells(surface, how.resolution, how.components, name)
         young = np.full(cells.mesh.n_cells, YOUNG)
-        return finite_cell_model(cells, young, how.poisson, DENSITY)
+        return finite_cell_model(cells, young, Regions.one(how.poisson, DENSITY, YOUNG))
     voxels = voxelize(surface, how.resolution, components=how.components, name=name)
     say_bridged(surface, voxels)
     mesh = hexmesh_from_voxels(voxels)
     young = np.full(mesh.n_cells, YOUNG)
-    return fine_model(mesh, young, poisson=how.poisson, density=DENSITY)
+    return fine_model(mesh, young, regions=Regions.one(how.poisson, DENSITY, YOUNG))
 
 
 def _expected(
@@ -187,7 +188,8 @@ def _expected(
     lattice = voxel_lattice(surface, how.resolution)
     cells = covering_on(surface, lattice, "largest", name).cells
     young = np.full(cells.mesh.n_cells, YOUNG)
-    reference = Reference(finite_cell_model(cells, young, how.poisson, DENSITY))
+    regions = Regions.one(how.poisson, DENSITY, YOUNG)
+    reference = Reference(finite_cell_model(cells, young, regions))
     result = solve(reference.model, modes=min(RIGID_MODES + how.count, LAST))
     assert result.modes is not None
     return reference.errors(values, result.eigenvalues, result.modes)

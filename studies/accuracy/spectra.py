@@ -9,6 +9,7 @@ from mpi4py import MPI
 from carillon.arrays import Array, Surface
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.model import Solid, fine_model
+from carillon.fem.regions import Regions
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
@@ -60,5 +61,5 @@ def _model(surface: Surface, options: ProblemOptions) -> Solid:
     mesh, cells = discretised(SolidSurface(options.mesh, surface), options)
     young = np.full(mesh.n_cells, YOUNG)
     if cells is None:
-        return fine_model(mesh, young, poisson=POISSON, density=DENSITY)
-    return finite_cell_model(cells.cells, young, POISSON, DENSITY)
+        return fine_model(mesh, young, regions=Regions.one(POISSON, DENSITY))
+    return finite_cell_model(cells.cells, young, Regions.one(POISSON, DENSITY))

@@ -52,8 +52,7 @@ class BenchmarkSolid:
             self.blocks,
             coarsening.moduli(block_moduli(self.blocks, young)),
             coarsening.lumped_fraction,
-            poisson=fine.poisson,
-            density=fine.density,
+            regions=fine.regions,
             lumped=fine.lumped,
         )
         return model, time.perf_counter() - begin

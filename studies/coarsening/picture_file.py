@@ -7,8 +7,8 @@ from typing import Any
 
 from carillon.arrays import Array
 from carillon.fem.geometry import HexMesh, hexmesh_from_grid
+from carillon.files.datasets import put
 from carillon.files.hdf5 import create_h5, open_h5
-from solver.files.model_group import put
 
 KIND = "coarsening pictures"
 SCHEMA = 1

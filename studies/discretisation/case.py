@@ -12,6 +12,7 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.fem import geometry
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import RIGID_MODES, Constants
+from carillon.fem.regions import Regions
 from carillon.limits import require_constants
 from solver.accuracy.material import INTERPOLATED, PlacedMaterial
 from solver.accuracy.voxels import voxel_lattice
@@ -92,7 +93,7 @@ def _ways(options: ProblemOptions, coarsening: Coarsening, modes: int) -> Ways:
         young_modulus(options.material, mesh, options.seed, label),
         options.material in INTERPOLATED,
     )
-    constants: Constants = {"poisson": options.poisson, "density": options.density}
+    constants: Constants = {"regions": Regions.one(options.poisson, options.density)}
     solid = (surface, name, options.components, options.resolution, material, constants)
     return Ways(*solid, coarsening, modes)
 

@@ -150,8 +150,7 @@ class Ways:
         clock.end("mesh")
         young = self.material.on(mesh, power)
         clock.end("material")
-        poisson, density = self.constants["poisson"], self.constants["density"]
-        return cover, finite_cell_model(cover.cells, young, poisson, density)
+        return cover, finite_cell_model(cover.cells, young, self.constants["regions"])
 
     def _voxels(self, clock: _Clock) -> tuple[HexMesh, Array]:
         mesh = voxel_mesh(self.surface, self.resolution, self.components, self.name)

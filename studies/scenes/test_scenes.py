@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
+from carillon.composition.materials import MATERIALS, named_material
 from sound.clips.wav import read_wav
-from sound.scenes.materials import MATERIALS, named_material
 from sound.scenes.performance import COLUMNS
 from sound.scenes.scene import Scene, load_scene
 from studies.scenes import tables

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from carillon.arrays import Array
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from carillon.processes.threads import one_thread
 from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
@@ -286,7 +286,7 @@ class _Sounding:
 
     def elastic(self, evaluation: Evaluation) -> Array:
         """Its elastic modes (3 n, N) on the nodes of the model."""
-        return self._simulation.mesh_rows(evaluation.modes.vectors[:, RIGID_MODES:])
+        return self._simulation.mesh_rows(evaluation.modes.elastic)
 
     def pushed(self, model: Solid, elastic: Array, inward: Array) -> Array:
         """What unit impulses (V, 3) at all vertices push the modes (3 n, N) of a model by."""

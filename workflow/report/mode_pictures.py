@@ -35,7 +35,7 @@ def draw_first_elastic_modes(
 ) -> dict[str, dict[str, Any]]:
     """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
     truth = read_modes(results.modes_path(model, TRUTH))
-    reference = displacement(truth, RIGID_MODES)
+    reference = displacement(truth, truth.model.rigid_modes)
     skin = results.skin(model, truth.model)
     view = view_of(truth.mesh, reference, skin)
     description, pictures = {}, []
@@ -46,9 +46,9 @@ def draw_first_elastic_modes(
         drawn = partial(draw, mesh=file.mesh, displacement=motion, **view)
         pictures.append(solid_picture(drawn))
         description[variant] = {
-            "hertz": float(file.frequencies[RIGID_MODES]),
+            "hertz": float(file.frequencies[file.model.rigid_modes]),
             "likeness": likeness,
-            "combined": len(cluster(truth.frequencies)),
+            "combined": len(cluster(truth.frequencies, truth.model.rigid_modes)),
         }
     for variant, path, picture in zip(shown, paths, cropped(pictures), strict=True):
         save_pixels(picture, path)
@@ -62,11 +62,11 @@ def displacement(file: ModesFile, index: int) -> Array:
     return file.modes[:, index].reshape(-1, 3)
 
 
-def cluster(frequencies: Array) -> list[int]:
+def cluster(frequencies: Array, rigid: int = RIGID_MODES) -> list[int]:
     """Indices of the modes that share the first elastic frequency, as in symmetric bodies."""
-    first = frequencies[RIGID_MODES]
-    near = np.abs(frequencies[RIGID_MODES:] / first - 1.0) <= CLUSTER_WIDTH
-    return [RIGID_MODES + int(index) for index in np.flatnonzero(near)]
+    first = frequencies[rigid]
+    near = np.abs(frequencies[rigid:] / first - 1.0) <= CLUSTER_WIDTH
+    return [rigid + int(index) for index in np.flatnonzero(near)]
 
 
 def aligned(
@@ -83,7 +83,7 @@ def aligned(
         likeness: the cosine between both, 1 for the same shape.
     """
     assert file.modes is not None
-    basis = file.modes[:, cluster(truth.frequencies)]
+    basis = file.modes[:, cluster(truth.frequencies, truth.model.rigid_modes)]
     if skin is None:
         # Nodes of a coarsened mesh lie on those of the fine one, or beside them where cells are
         # void.
@@ -116,7 +116,7 @@ def view_of(mesh: HexMesh, motion: Array, skin: Skin | None = None) -> dict[str,
 def overview_figure(results: Run, model: str) -> Figure:
     """First elastic mode of the truth and of the fastest method, and the spectra of both."""
     truth = read_modes(results.modes_path(model, TRUTH))
-    reference = displacement(truth, RIGID_MODES)
+    reference = displacement(truth, truth.model.rigid_modes)
     skin = results.skin(model, truth.model)
     view = view_of(truth.mesh, reference, skin)
     fast = results.shown_variants(model)[-1]
@@ -129,7 +129,7 @@ def overview_figure(results: Run, model: str) -> Figure:
             body = figure.add_axes((left, 0.0, 0.29, 0.84), projection="3d")
             draw(body, file.mesh, motion, **view)
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
-            hertz = file.frequencies[RIGID_MODES]
+            hertz = file.frequencies[file.model.rigid_modes]
             text = f"{file.mesh.n_dofs:,} unknowns, mode 7 at {hertz:,.0f} Hz"
             figure.text(left + 0.01, 0.87, text, color=MUTED)
         rows = [row for row in results.table("frequencies").rows if row["model"] == model]

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from carillon.fem.model import RIGID_MODES
 from carillon.files.yaml_input import read_own_yaml
 from solver.files.modes_file import frequencies
 from solver.verification.matching import AUDIBLE_FIRST, AUDIBLE_LAST
@@ -108,7 +107,7 @@ def _spectrum(evidence: Evidence, variant: str) -> Iterator[Criterion]:
     values = {
         "residual": limits.residual(evidence, variant),
         "orthogonality": limits.orthogonality(evidence, variant),
-        "rigid": Worst(audit["rigid_modes"], RIGID_MODES),
+        "rigid": Worst(audit["rigid_modes"], evidence.shown[variant].model.rigid_modes),
         # Without a count there is nothing to find, and what was expected is the limit.
         "counted": Worst(None, expected) if counted is None else Worst(expected, counted),
     }
@@ -131,7 +130,7 @@ def _of_coarsened(evidence: Evidence) -> list[Criterion]:
 
 def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
     comparison, tolerances = evidence.compared[COARSENED], evidence.tolerances
-    last = min(AUDIBLE_LAST, RIGID_MODES + comparison["modes_compared"])
+    last = min(AUDIBLE_LAST, evidence.shown[TRUTH].model.rigid_modes + comparison["modes_compared"])
     rms, worst = (comparison[f"frequency_{name}_relative_error_7_60"] for name in ("rms", "max"))
     limited = {
         "frequency_rms": Worst(rms, tolerances["frequency_rms"]),

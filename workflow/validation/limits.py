@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.fem.model import RIGID_MODES
 from solver.response.allowed_motion import motion_limit
 from solver.response.response import Damping
 from solver.verification.allowance import (
@@ -40,11 +39,11 @@ class Worst:
 
 def residual(evidence: Evidence, variant: str) -> Worst:
     """Worst residual in energy of the elastic modes."""
-    values = evidence.shown[variant].eigenvalues
-    allowed = residual_limits(values, _errors(evidence, variant))[RIGID_MODES:]
-    values = np.array(evidence.audit["spectra"][variant]["energy_residuals"])[RIGID_MODES:]
+    values, rigid = evidence.shown[variant].eigenvalues, _rigid(evidence)
+    allowed = residual_limits(values, _errors(evidence, variant), rigid)[rigid:]
+    values = np.array(evidence.audit["spectra"][variant]["energy_residuals"])[rigid:]
     key = "truth_residual" if variant == TRUTH else "residual"
-    return _worst(values, allowed, evidence.tolerances[key], _mode)
+    return _worst(values, allowed, evidence.tolerances[key], _mode(rigid))
 
 
 def orthogonality(evidence: Evidence, variant: str) -> Worst:
@@ -58,12 +57,14 @@ def orthogonality(evidence: Evidence, variant: str) -> Worst:
 def eigenvalue_error(evidence: Evidence) -> Worst:
     """Worst relative error of an eigenvalue of the solver."""
     exact, values = (evidence.shown[name].eigenvalues for name in (TRUTH, SOLVED))
-    elastic = slice(RIGID_MODES, min(len(exact), len(values)))
+    elastic = slice(_rigid(evidence), min(len(exact), len(values)))
     errors = np.abs(values[elastic] / exact[elastic] - 1.0)
     rounding = np.array(evidence.audit["spectra"][TRUTH]["rounding"])
     tolerance = ACCEPTED * evidence.config["solver"]["tolerance"]
-    allowed = accepted_errors(exact, rounding, tolerance)[elastic] / exact[elastic]
-    return _worst(errors, allowed, evidence.tolerances["eigenvalue_error"], _mode)
+    allowed = (
+        accepted_errors(exact, rounding, tolerance, _rigid(evidence))[elastic] / exact[elastic]
+    )
+    return _worst(errors, allowed, evidence.tolerances["eigenvalue_error"], _mode(_rigid(evidence)))
 
 
 def subspace_angle(evidence: Evidence) -> Worst:
@@ -81,15 +82,16 @@ def subspace_angle(evidence: Evidence) -> Worst:
 def angles_allowed(evidence: Evidence, groups: list[tuple[int, int]]) -> Array:
     """Angles (g,) [rad] of clusters that the tolerance of the run allows."""
     errors = _errors(evidence, SOLVED)
-    return angle_limits(evidence.shown[TRUTH].eigenvalues, errors, groups)
+    return angle_limits(evidence.shown[TRUTH].eigenvalues, errors, groups, _rigid(evidence))
 
 
 def response(evidence: Evidence) -> Worst:
     """Difference of the motion after a strike by the solver's modes from that by the truth's."""
     struck, truth = evidence.response, evidence.shown[TRUTH]
     damping = Damping(struck.attributes["mass_damping"], struck.attributes["stiffness_damping"])
-    last = RIGID_MODES + len(struck.seen.eigenvalues)
-    errors = _errors(evidence, SOLVED)[RIGID_MODES:last]
+    rigid = _rigid(evidence)
+    last = rigid + len(struck.seen.eigenvalues)
+    errors = _errors(evidence, SOLVED)[rigid:last]
     unknowns = truth.model.n_dofs
     allowed = motion_limit(struck.seen, errors, damping, struck.seconds, unknowns)
     limit = evidence.tolerances["response"]
@@ -104,17 +106,22 @@ def _errors(evidence: Evidence, variant: str) -> Array:
     """
     values = evidence.shown[variant].eigenvalues
     rounding = np.array(evidence.audit["spectra"][variant]["rounding"])
-    errors = accepted_errors(values, rounding, evidence.config["solver"]["tolerance"])
+    tolerance = evidence.config["solver"]["tolerance"]
+    errors = accepted_errors(values, rounding, tolerance, _rigid(evidence))
     if variant == SOLVED:
         exact = evidence.shown[TRUTH].eigenvalues
-        elastic = slice(RIGID_MODES, min(len(exact), len(values)))
+        elastic = slice(_rigid(evidence), min(len(exact), len(values)))
         found = np.abs(values[elastic] - exact[elastic])
         errors[elastic] = np.clip(found, errors[elastic], ACCEPTED * errors[elastic])
     return errors
 
 
-def _mode(index: int) -> str:
-    return f"mode {RIGID_MODES + 1 + index}"
+def _rigid(evidence: Evidence) -> int:
+    return evidence.shown[TRUTH].model.rigid_modes
+
+
+def _mode(rigid: int) -> Callable[[int], str]:
+    return lambda index: f"mode {rigid + 1 + index}"
 
 
 def _worst(values: Array, allowed: Array, limit: float | None, name: Callable[[int], str]) -> Worst:

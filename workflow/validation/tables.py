@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from carillon.fem.model import RIGID_MODES
 from studies.base.table import Column, Row, each, hidden, table
 from workflow.validation.criteria import judge
 from workflow.validation.distance import distance_in_words
@@ -74,7 +73,8 @@ def errors(evidence: Evidence) -> Iterator[Row]:
     Eigenvalues err about twice as much; the file holds those of all modes."""
     spectra = evidence.shown
     truth = spectra[TRUTH]
-    for index in range(RIGID_MODES, min(len(part.eigenvalues) for part in spectra.values())):
+    last = min(len(part.eigenvalues) for part in spectra.values())
+    for index in range(truth.model.rigid_modes, last):
         row = {"mode": index + 1, TRUTH: float(truth.frequencies[index])}
         for variant in evidence.compared:
             spectrum = spectra[variant]

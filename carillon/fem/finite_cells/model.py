@@ -1,50 +1,47 @@
 """A solid of finite cells with material."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import NODES
-from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.hanging import at_nodes, node_places, node_weights
 from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
+from carillon.fem.finite_cells.shared_cells import SharedCells, point_moduli, point_shares
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import DEFAULT_DENSITY, Damping, Solid
+from carillon.fem.model import Solid
 from carillon.fem.moduli import require_moduli
+from carillon.fem.regions import RegionOf, Regions
+from carillon.fem.supports import Attached, Supports
 
 
 @dataclass(frozen=True)
 class CellElements(Elements):
     """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside."""
 
+    ROWS = ("young", "share", "law", "span", "kinds", "support")
+
     young: Array
-    """(c, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`."""
+    """(c, s, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`, of
+    what the cell holds of each of its regions."""
     share: Array
-    """(c, 125) the same of the density over that of the solid."""
+    """(c, 125) the same of the density over that of the first region."""
     edge: float
     """Step of the lattice [m]."""
-    poisson: float
-    density: float
-    """See `Solid`."""
+    regions: Regions
+    law: RegionOf | None = None
+    """(c, s) regions of each cell; None if there is one, and s is 1."""
     span: NDArray[np.int32] | None = None
     kinds: Index | None = None
     """(c,) see `FiniteCells`, of cells of two sizes; else None."""
-
-    def of(self, *arrays: NDArray[Any]) -> Self:
-        young, share, *sizes = arrays
-        span, kinds = sizes or (None, None)
-        return replace(self, young=young, share=share, span=span, kinds=kinds)
-
-    def arrays(self) -> list[NDArray[Any]]:
-        if self.span is None or self.kinds is None:
-            return [self.young, self.share]
-        return [self.young, self.share, self.span, self.kinds]
+    support: NDArray[np.int32] | None = None
+    attached: Attached | None = None
 
     @property
     def steps(self) -> int:
@@ -56,7 +53,7 @@ class CellElements(Elements):
             return np.broadcast_to(NODES, (len(self), *NODES.shape))
         return node_places(self.kinds) * (self.span // 2)[:, None, None]
 
-    def _edges(self, chosen: Chosen) -> Array | float:
+    def edges(self, chosen: Chosen) -> Array | float:
         """Edges [m] of the chosen cells, (c, 1) of cells of two sizes."""
         if self.span is None:
             return 2.0 * self.edge
@@ -74,12 +71,38 @@ class CellElements(Elements):
         # None is needed: parts in one place have a node of their own in their middle.
         return np.zeros(len(self), dtype=np.int64)
 
-    def stiffness(self, chosen: Chosen = slice(None)) -> Array:
-        matrices = (self._edges(chosen) * self.young[chosen]) @ point_stiffness(self.poisson)
+    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
+        values = shape_functions(places)
+        if self.kinds is None:
+            return values
+        return np.asarray(values[:, None] @ node_weights(self.kinds[elements]))[:, 0]
+
+    def by_law(self, chosen: Chosen) -> list[tuple[int, Index | slice, Array]]:
+        """Regions, the chosen cells that hold some of each, and moduli (r, 125) there."""
+        young = self.young[chosen]
+        if self.law is None:
+            return [(0, slice(None), young[:, 0])]
+        law = self.law[chosen]
+        found: list[tuple[int, Index | slice, Array]] = []
+        for number in np.unique(law):
+            cell, slot = np.nonzero((law == number) & young.any(axis=2))
+            found.append((int(number), cell, young[cell, slot]))
+        return found
+
+    def _stiffness(self, chosen: Chosen) -> Array:
+        edges = self.edges(chosen)
+        parts = self.by_law(chosen)
+        if self.law is None:
+            matrices = (edges * parts[0][2]) @ point_stiffness(self.regions.laws[0])
+        else:
+            matrices = np.zeros((len(self.young[chosen]), 81 * 81))
+            for number, cells, moduli in parts:
+                matrices[cells] += moduli @ point_stiffness(self.regions.laws[number])
+            matrices *= edges
         return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
 
-    def nodal_mass(self, chosen: Chosen = slice(None)) -> Array:
-        scale = self.density * self._edges(chosen) ** 3
+    def _nodal_mass(self, chosen: Chosen) -> Array:
+        scale = float(self.regions.density[0]) * self.edges(chosen) ** 3
         matrices = (scale * self.share[chosen]) @ point_mass()
         return self._between_nodes(matrices.reshape(-1, 27, 27), chosen)
 
@@ -93,10 +116,12 @@ class FiniteCellModel(Solid):
     young: Array
     """(m,) Young's modulus [Pa] of each voxel, taken as it is: what users give goes through
     `finite_cell_model` and `with_young`."""
-    poisson: float = DEFAULT_POISSON
-    density: float = DEFAULT_DENSITY
-    damping: Damping | None = None
-    """See `Solid`."""
+    regions: Regions = field(default_factory=Regions.one)
+    region: RegionOf | None = None
+    """(m,) region that most of each voxel is of; None if there is one."""
+    shared: SharedCells | None = None
+    """Cells with voxels of several regions; None if there are none."""
+    supports: Supports | None = None
 
     @property
     def mesh(self) -> HexMesh:  # type: ignore[override]
@@ -105,10 +130,31 @@ class FiniteCellModel(Solid):
     @cached_property
     def elements(self) -> CellElements:
         # Made once, since the weights of all cells go into them.
-        young, share = map(self.cells.point_values, (self.young, np.ones(self.mesh.n_cells)))
-        constants = self.mesh.edge, self.poisson, self.density
+        young, law = self._point_moduli(self.young)
+        share = self._shares()
         span = self.cells.span if self.cells.is_mixed else None
-        return CellElements(young, share, *constants, span, self.cells.kinds)
+        support, attached = self.attached()
+        return CellElements(
+            young,
+            share,
+            self.mesh.edge,
+            self.regions,
+            law,
+            span,
+            self.cells.kinds,
+            support,
+            attached,
+        )
+
+    def _point_moduli(self, young: Array) -> tuple[Array, RegionOf | None]:
+        if self.region is None:
+            return self.cells.point_values(young)[:, None], None
+        return point_moduli(self.cells, self.regions, self.region, self.shared, young)
+
+    def _shares(self) -> Array:
+        if self.region is None:
+            return self.cells.point_values(np.ones(self.mesh.n_cells))
+        return point_shares(self.cells, self.regions, self.region, self.shared)
 
     @property
     def connectivity(self) -> NDArray[np.int32]:
@@ -122,31 +168,37 @@ class FiniteCellModel(Solid):
     def filled(self) -> Flags:
         return np.asarray(self.cells.voxels >= 0)
 
-    def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        values = shape_functions(places)
-        if self.cells.kinds is None:
-            return values
-        return np.asarray(values[:, None] @ node_weights(self.cells.kinds[elements]))[:, 0]
-
     def element_moduli(self, young: Array) -> Array:
-        return self.cells.point_values(require_moduli(young, self.mesh.n_cells, points=False))
+        given = require_moduli(young, self.mesh.n_cells, points=False)
+        return self._point_moduli(given)[0]
 
     def with_young(self, young: Array) -> Self:
         return replace(self, young=require_moduli(young, self.mesh.n_cells, points=False))
 
     @property
     def mass(self) -> float:
-        return self.density * self.cells.volume
+        if self.region is None:
+            return float(self.regions.density[0]) * self.cells.volume
+        edges = self.cells.span * self.mesh.edge
+        volumes = self._shares().sum(axis=1) * edges**3
+        return float(self.regions.density[0] * volumes.sum())
+
+    @property
+    def density(self) -> float:
+        if self.region is None:
+            return float(self.regions.density[0])
+        return self.mass / self.cells.volume
 
 
 def finite_cell_model(
     cells: FiniteCells,
     young: Array,
-    poisson: float = DEFAULT_POISSON,
-    density: float = DEFAULT_DENSITY,
-    damping: Damping | None = None,
+    regions: Regions | None = None,
+    region: RegionOf | None = None,
+    shared: SharedCells | None = None,
+    supports: Supports | None = None,
 ) -> FiniteCellModel:
-    """Solid of finite cells with moduli `young` (m,) [Pa] of the voxels.
+    """Solid of finite cells with moduli `young` (m,) [Pa] of the voxels, and the `region` of each.
 
     Raises UserError for what `carillon.fem.moduli.require_moduli` refuses.
 
@@ -160,4 +212,5 @@ def finite_cell_model(
     (945, 3.0)
     """
     given = require_moduli(young, cells.mesh.n_cells, points=False)
-    return FiniteCellModel(cells, given, poisson, density, damping)
+    regions = Regions.one() if regions is None else regions
+    return FiniteCellModel(cells, given, regions, region, shared, supports)

@@ -13,7 +13,8 @@ import numpy as np
 
 from carillon.arrays import Array, frozen
 from carillon.fem.block import NODES
-from carillon.fem.element import CORNERS, KEPT, elasticity_matrix, strain_displacement
+from carillon.fem.elasticity import Elasticity
+from carillon.fem.element import CORNERS, KEPT, matrix_of, strain_displacement
 
 POINTS = 125
 """Points that the integrals over a cell are taken from; i + 5 j + 25 k is at i, j, k along x, y,
@@ -102,19 +103,20 @@ def octant_weights() -> Array:
 
 
 @lru_cache(KEPT)
-def strain_factors(poisson: float) -> Array:
+def strain_factors(law: float | Elasticity) -> Array:
     """B (125, 6, 81): strains at the points, times a root of the elasticity, for a unit edge.
 
     A cell of edge h with weighted moduli w_p [Pa] has the stiffness ``h * sum_p w_p B_p^T B_p``.
+    `law` is Poisson's ratio, or another elasticity.
     """
-    root = np.linalg.cholesky(elasticity_matrix(poisson)).T
+    root = np.linalg.cholesky(matrix_of(law)).T
     return frozen(root @ strain_displacement(shape_gradients(points())))
 
 
 @lru_cache(KEPT)
-def point_stiffness(poisson: float) -> Array:
+def point_stiffness(law: float | Elasticity) -> Array:
     """B_p^T B_p (125, 81 * 81), see `strain_factors`."""
-    factors = strain_factors(poisson)
+    factors = strain_factors(law)
     return frozen((factors.transpose(0, 2, 1) @ factors).reshape(POINTS, -1))
 
 

@@ -13,11 +13,11 @@ from scipy.optimize import brentq
 from carillon.arrays import Array
 from carillon.command_line.logs import warn_once
 from carillon.command_line.progress import track
+from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError, one_line
 from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactLog, ContactPoints
 from sound.scenes.contact.start import start
-from sound.scenes.materials import NamedMaterial
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import Motion
 from sound.scenes.scene import EngineEntry, Vector

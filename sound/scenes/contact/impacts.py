@@ -17,10 +17,10 @@ from scipy.signal import find_peaks, peak_prominences
 from scipy.spatial import cKDTree
 
 from carillon.arrays import Array, Integers
+from carillon.composition.materials import NamedMaterial
 from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.hertz import bounce_seconds, compliance
-from sound.scenes.materials import NamedMaterial
 from sound.scenes.performance import GROUND, Impact
 from sound.scenes.scene import EngineEntry, Vector
 

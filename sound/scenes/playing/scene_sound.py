@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.composition.materials import NamedMaterial
 from carillon.processes.threads import in_parallel
 from sound.scenes.audible.contact_damping import rests_of
 from sound.scenes.audible.excitation import excitation
@@ -15,7 +16,6 @@ from sound.scenes.audible.sustained_contact import SustainedForce, sustained_for
 from sound.scenes.bodies import Body
 from sound.scenes.contact.engine import Course
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact
-from sound.scenes.materials import NamedMaterial
 from sound.scenes.performance import GROUND
 from sound.scenes.scene import EngineEntry, SoundEntry
 from sound.synthesis.driven import ring

@@ -1,4 +1,4 @@
-"""Materials of solids in scenes, by name: elasticity, damping, contact and looks."""
+"""Materials by name: elasticity, damping, contact and looks."""
 
 import difflib
 from collections.abc import Mapping
@@ -6,14 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from carillon.errors import UserError
+from carillon.fem.elasticity import orthotropic_matrix
+from carillon.fem.regions import Regions
 from carillon.files.yaml_input import read_own_yaml
-from solver.response.response import Damping
+
+Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class NamedMaterial:
-    """A homogeneous, isotropic material by its name in scenes.
+    """A homogeneous material by its name; of wood, also what it is along its grain and across.
 
     Attributes
     ----------
@@ -39,11 +44,29 @@ class NamedMaterial:
     colour: tuple[float, float, float]
     """(3,) red, green and blue from 0 to 1 (sRGB)."""
     source: str
+    grain_young: Triple | None = None
+    """(3,) Young's moduli [Pa] along the grain, the radius and the rings of wood; None if it is
+    isotropic."""
+    grain_shear: Triple | None = None
+    """(3,) shear moduli [Pa] of grain and radius, of radius and rings, of rings and grain."""
+    grain_poisson: Triple | None = None
+    """(3,) Poisson's ratios of these pairs: across by the second, stress along the first."""
 
     @property
-    def damping(self) -> Damping:
-        """Its Rayleigh damping, as the solver takes it."""
-        return Damping(mass_per_second=self.alpha, stiffness_seconds=self.beta)
+    def is_wood(self) -> bool:
+        """Whether it is not the same in all directions."""
+        return self.grain_young is not None
+
+    def region(self, name: str, density: float | None = None) -> Regions:
+        """Its row in a solid's table of regions; axes x, y, z are grain, radius and rings."""
+        own = self.density if density is None else density
+        damping = self.alpha, self.beta
+        if self.grain_young is None:
+            return Regions.one(self.poisson, own, self.young, damping, name)
+        assert self.grain_shear is not None and self.grain_poisson is not None
+        triples = self.grain_young, self.grain_shear, self.grain_poisson
+        matrix = orthotropic_matrix(*(np.array(triple) for triple in triples))
+        return Regions.anisotropic(matrix, own, damping, name)
 
 
 def named_material(name: str) -> NamedMaterial:
@@ -64,9 +87,13 @@ def named_material(name: str) -> NamedMaterial:
 def _material(name: str, values: Mapping[str, Any]) -> NamedMaterial:
     """A material from its entry, whose numbers may be integers."""
     texts = {key: values[key] for key in ("about", "source")}
-    colour = tuple(map(float, values["colour"]))
-    numbers = {key: float(value) for key, value in values.items() if key not in (*texts, "colour")}
-    made: dict[str, Any] = {**texts, **numbers, "colour": colour}
+    triples = {
+        key: tuple(map(float, values[key]))
+        for key in ("colour", "grain_young", "grain_shear", "grain_poisson")
+        if key in values
+    }
+    numbers = {key: float(value) for key, value in values.items() if key not in (*texts, *triples)}
+    made: dict[str, Any] = {**texts, **numbers, **triples}
     return NamedMaterial(name, **made)
 
 

@@ -1,0 +1,271 @@
+"""Regions and supports as people write them: in a file, a project or a call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from carillon.arrays import Surface
+from carillon.composition.composition import AxesAt, Composition, MaterialRegion, axes_about
+from carillon.composition.domains import Ball, Box, ClosedSurface, Domain, Everywhere, Expression
+from carillon.composition.materials import NamedMaterial, named_material
+from carillon.composition.supports import Support
+from carillon.errors import UserError
+from carillon.fem.elasticity import axes_along, orthotropic_matrix
+from carillon.fem.regions import Regions
+from carillon.parameters import REQUIRED, OneOf, option, parameters
+from carillon.parameters.documents import read_parameters
+from carillon.parameters.model import Within
+from carillon.parameters.quantities import (
+    Density,
+    MetresPerUnit,
+    NonNegative,
+    PoissonRatio,
+    Positive,
+    ShownName,
+    Triple,
+    YoungsModulus,
+    between,
+)
+
+Coordinate = Annotated[float, between(-1e9, 1e9)]
+Vector = Triple[Coordinate]
+Along = Annotated[str, OneOf("x", "y", "z", "xy", "yz", "xz", "xyz")]
+DEFAULT_YOUNG = 1e9
+"""Young's modulus [Pa] of a region that names neither a material nor a modulus."""
+
+
+@parameters
+class RegionEntry:
+    """A region of a solid: what it is made of, and where it is."""
+
+    name: ShownName = option(REQUIRED, "what messages and tables call it")
+    material: str | None = option(None, "name of its material, such as steel or spruce")
+    young: YoungsModulus | None = option(
+        None, "Young's modulus in place of the material's, where it is isotropic [Pa]"
+    )
+    poisson: PoissonRatio | None = option(None, "Poisson's ratio in place of the material's [1]")
+    density: Density | None = option(None, "mass density in place of the material's [kg/m^3]")
+    loss_factor: Annotated[float, between(0.0, 1.0)] | None = option(
+        None, "loss factor at 1 kHz in place of the material's damping [1]"
+    )
+    grain_young: Triple[YoungsModulus] | None = option(
+        None, "Young's moduli along grain, radius and rings of wood, or any three axes [Pa]"
+    )
+    grain_shear: Triple[YoungsModulus] | None = option(
+        None,
+        "shear moduli of the first and second of these axes, second and third, third and "
+        "first [Pa]",
+    )
+    grain_poisson: Triple[Annotated[float, between(-10.0, 10.0)]] | None = option(
+        None, "Poisson's ratios of the same pairs: across by the second, stress along the first [1]"
+    )
+    grain: Vector | None = option(None, "direction of the grain, the first axis (x unless given)")
+    radial: Vector | None = option(None, "direction across it, the second axis")
+    pith: Vector | None = option(
+        None, "a point of the pith of the tree [m]: the radius leads away from it at every place"
+    )
+    where: str | None = option(
+        None, "comparisons of x, y and z [m] that hold in the region, such as z < 0.01"
+    )
+    box: tuple[Vector, Vector] | None = option(None, "lowest and highest corner of a box [m]")
+    mesh: str | None = option(None, "file of a closed surface around it, relative to this file")
+    unit: MetresPerUnit = option(1.0)
+
+    def __post_init__(self) -> None:
+        places = [name for name in ("where", "box", "mesh") if getattr(self, name) is not None]
+        if len(places) > 1:
+            raise ValueError(f"expected one place, found {' and '.join(places)}")
+        given = [self.grain_young, self.grain_shear, self.grain_poisson]
+        if any(each is not None for each in given) and None in given:
+            raise ValueError("grain_young, grain_shear and grain_poisson go together")
+        if self.radial is not None and self.pith is not None:
+            raise ValueError("expected radial or pith, found both")
+
+    @property
+    def _material(self) -> NamedMaterial | None:
+        return None if self.material is None else named_material(self.material)
+
+    def row(self) -> Regions:
+        """Its row in the table of regions.
+
+        Raises UserError for a material that there is not, or constants that no material has.
+        """
+        material = self._material
+        damping = None if material is None else (material.alpha, material.beta)
+        if self.loss_factor is not None:
+            omega = 2.0 * np.pi * 1000.0
+            damping = 0.5 * self.loss_factor * omega, 0.5 * self.loss_factor / omega
+        density = self.density or (1000.0 if material is None else material.density)
+        try:
+            if self.grain_young is not None:
+                triples = self.grain_young, self.grain_shear, self.grain_poisson
+                matrix = orthotropic_matrix(*(np.array(triple) for triple in triples))
+                return Regions.anisotropic(matrix, density, damping, self.name)
+            if material is not None and material.is_wood and self.young is self.poisson is None:
+                row = material.region(self.name, density)
+                return replace(row, damping=(damping,))
+            young = self.young or (DEFAULT_YOUNG if material is None else material.young)
+            poisson = self.poisson
+            if poisson is None:
+                poisson = 0.25 if material is None else material.poisson
+            return Regions.one(poisson, density, young, damping, self.name)
+        except UserError as error:
+            raise UserError(f"region {self.name!r}: {error}") from None
+
+    def domain(self, folder: Path) -> Domain:
+        """Where it is; files are relative to a folder."""
+        if self.where is not None:
+            return Expression(self.where)
+        if self.box is not None:
+            low, high = (np.array(corner) for corner in self.box)
+            if not (low < high).all():
+                raise UserError(
+                    f"region {self.name!r}: the box from {list(low)} to {list(high)} is empty; "
+                    "expected its lowest and highest corner"
+                )
+            return Box(low, high)
+        if self.mesh is not None:
+            from carillon.fem.geometry import load_surface  # Its import takes long.
+
+            path = self.mesh if self.mesh.startswith("builtin:") else str(folder / self.mesh)
+            return ClosedSurface(load_surface(path, self.unit))
+        return Everywhere()
+
+    def axes(self) -> np.ndarray | AxesAt | None:
+        """Axes of the material, or where they lie at each place."""
+        if self.grain is None and self.radial is None and self.pith is None:
+            return None
+        grain = np.array(self.grain or (1.0, 0.0, 0.0), dtype=float)
+        source = f"region {self.name!r}"
+        if self.pith is not None:
+            axes_along(grain, source=source)
+            return axes_about(grain, np.array(self.pith, dtype=float))
+        radial = None if self.radial is None else np.array(self.radial, dtype=float)
+        return axes_along(grain, radial, source)
+
+
+@parameters
+class SupportEntry:
+    """What holds a solid somewhere, or is fixed to it."""
+
+    where: str | None = option(
+        None, "comparisons of x, y and z [m] that hold there, such as z < 0.01; or region:NAME"
+    )
+    at: Vector | None = option(None, "a point of the solid [m]")
+    radius: Positive | None = option(None, "distance from the point within which all is held [m]")
+    along: Along = option("xyz", "axes along which it acts")
+    spring: NonNegative | None = option(
+        None,
+        "stiffness of springs there: of each point [N/m], or by area of surface [N/m^3]; held "
+        "if null",
+    )
+    pad: str | None = option(None, "name of the material of a pad that it rests on")
+    thickness: Positive | None = option(None, "thickness of the pad [m]")
+    mass: Positive | None = option(None, "mass that is fixed to the point [kg]")
+
+    def __post_init__(self) -> None:
+        if (self.where is None) == (self.at is None):
+            raise ValueError("expected where or at")
+        if (self.pad is None) != (self.thickness is None):
+            raise ValueError("pad and thickness go together")
+        if self.mass is not None and (self.at is None or self.spring is not None):
+            raise ValueError("mass goes with a point, and without a spring")
+        if self.pad is not None and self.spring is not None:
+            raise ValueError("expected spring or pad, found both")
+        if self.pad is not None and self.at is not None and self.radius is None:
+            raise ValueError("pad goes with where, or with a radius about a point")
+        if self.radius is not None and self.at is None:
+            raise ValueError("radius goes with at")
+
+    def support(self, regions: dict[str, Domain]) -> Support:
+        """The support; raises UserError for a region or a material that there is not."""
+        label = f"support {self.where!r}" if self.at is None else f"support at {list(self.at)}"
+        axes = "x" in self.along, "y" in self.along, "z" in self.along
+        pad = None
+        if self.pad is not None and self.thickness is not None:
+            material = named_material(self.pad)
+            across = material.young / self.thickness
+            pad = across, across / (2.0 * (1.0 + material.poisson))
+        spring = None if self.spring is None else np.array(self.spring)
+        if self.at is not None and self.radius is None:
+            point = (float(self.at[0]), float(self.at[1]), float(self.at[2]))
+            return Support(label, None, point, axes, spring, self.mass or 0.0)
+        return Support(label, self._domain(regions), None, axes, spring, pad=pad)
+
+    def _domain(self, regions: dict[str, Domain]) -> Domain:
+        if self.at is not None and self.radius is not None:
+            return Ball(np.array(self.at, dtype=float), self.radius)
+        assert self.where is not None
+        if not self.where.startswith("region:"):
+            return Expression(self.where)
+        name = self.where.removeprefix("region:")
+        if name not in regions:
+            known = ", ".join(map(repr, regions)) or "none"
+            raise UserError(f"support: there is no region {name!r}; the solid has {known}")
+        return regions[name]
+
+
+@parameters
+class CompositionEntry:
+    """What a solid is made of, and what holds it."""
+
+    regions: Annotated[tuple[RegionEntry, ...], Within(max_length=1000)] = option(
+        (), "regions in their order: of several in one place the last one counts"
+    )
+    supports: Annotated[tuple[SupportEntry, ...], Within(max_length=1000)] = option(
+        (), "what holds the solid"
+    )
+
+    def __post_init__(self) -> None:
+        names = [entry.name for entry in self.regions]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two regions are called {name!r}; give each a name of its own")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Regions and supports with their places."""
+
+    composition: Composition | None
+    supports: tuple[Support, ...]
+
+
+def read_composition(path: str | Path) -> CompositionEntry:
+    """Read regions and supports from a YAML file.
+
+    Raises UserError with the line and one sentence about the first thing that is wrong.
+    """
+    return read_parameters(path, CompositionEntry, "regions and supports of a solid")
+
+
+def compose(
+    entry: CompositionEntry,
+    surface: Surface,
+    name: str,
+    folder: Path = Path(),
+    fixed: Sequence[str] = (),
+) -> Placed:
+    """Regions and supports of the solid inside a surface.
+
+    Parameters
+    ----------
+    folder
+        That files of the entry are relative to.
+    fixed
+        Further places that are held, see `SupportEntry.where`.
+    """
+    domains = {each.name: each.domain(folder) for each in entry.regions}
+    composition = None
+    if entry.regions:
+        parts = [
+            MaterialRegion(each.row(), domains[each.name], each.axes()) for each in entry.regions
+        ]
+        composition = Composition(parts, name, ClosedSurface(surface))
+    entries = [*entry.supports, *(SupportEntry(where=where) for where in fixed)]
+    return Placed(composition, tuple(each.support(domains) for each in entries))

@@ -1,0 +1,177 @@
+"""Where a solid is held, rests on pads, or carries masses, in any discretisation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from carillon.arrays import Array, Surface
+from carillon.composition.domains import Domain
+from carillon.errors import UserError
+from carillon.fem.embedding import embedding
+from carillon.fem.model import Solid
+from carillon.fem.supports import Supports
+
+HELD = 1e6
+"""Stiffness of the spring at a held point, in multiples of modulus times lattice spacing. What is
+held moves by a millionth of what one spacing of the solid is strained."""
+SAMPLE = 0.5
+"""Largest edge of the triangles whose middles stand for a surface, in lattice spacings."""
+SLIGHT = 1e-6
+"""Distance outside a surface, in sides of the solid, at which it is asked for, too: a face is of
+what begins there."""
+REACH = 1.5
+"""Largest distance of a named point from the solid, in lattice spacings."""
+ALL = (True, True, True)
+
+
+@dataclass(frozen=True)
+class Support:
+    """A part of the solid, or a point of it, that is held, springy or heavy."""
+
+    label: str
+    """What it is called in messages."""
+    domain: Domain | None = None
+    point: tuple[float, float, float] | None = None
+    """Where it is: all of the solid in a domain, or a point [m]."""
+    axes: tuple[bool, bool, bool] = ALL
+    """Which of x, y, z it acts along."""
+    spring: Array | None = None
+    """Springs in place of holding it: a number or (3, 3) [N/m] at a point, [N/m^3] by area."""
+    mass: float = 0.0
+    """Mass [kg] that is fixed to a point, which does not hold it."""
+    pad: tuple[float, float] | None = None
+    """Springs [N/m^3] by area across and along the surface, in place of `spring`."""
+
+
+def placed_supports(
+    parts: Sequence[Support], solid: Solid, surface: Surface, name: str = "mesh"
+) -> Supports | None:
+    """Supports at points of a discretised solid; None without any.
+
+    Raises UserError for a support that meets nothing of the solid, or if nothing is left to move.
+
+    Parameters
+    ----------
+    solid
+        In its finest discretisation, whose spacing says how closely points lie.
+    surface
+        Triangles around it [m].
+    """
+    if not parts:
+        return None
+    samples = _Samples.of_surface(surface, SAMPLE * solid.mesh.edge)
+    found = [_placed(part, solid, samples, name) for part in parts]
+    supports = Supports.together(found)
+    _require_movable(parts, solid, name)
+    return supports
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Points of a surface, each with the area it stands for."""
+
+    points: Array
+    normals: Array
+    areas: Array
+    """(s, 3), (s, 3), (s,) [m^2]."""
+    size: float
+    """Longest side of the surface [m]."""
+
+    @classmethod
+    def of_surface(cls, surface: Surface, longest: float) -> _Samples:
+        import trimesh  # Its import takes long.
+
+        vertices, faces = trimesh.remesh.subdivide_to_size(
+            surface.vertices, surface.faces, max_edge=longest, max_iter=40
+        )
+        corners = np.asarray(vertices)[np.asarray(faces)]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(across, axis=1)
+        kept = length > 0.0
+        normals = across[kept] / length[kept, None]
+        size = float(np.ptp(np.asarray(surface.bounds), axis=0).max())
+        return cls(corners[kept].mean(axis=1), normals, 0.5 * length[kept], size)
+
+    def inside(self, domain: Domain) -> Array:
+        """Numbers of those in a domain, or at its border."""
+        slightly = SLIGHT * self.size * self.normals
+        near = [domain.contains(self.points + side * slightly) for side in (0.0, 1.0, -1.0)]
+        return np.flatnonzero(np.any(near, axis=0))
+
+
+def _placed(part: Support, solid: Solid, samples: _Samples, name: str) -> Supports:
+    if part.point is not None:
+        return _at_point(part, solid, name)
+    assert part.domain is not None
+    own = samples.inside(part.domain)
+    along = np.diag(np.asarray(part.axes, dtype=float))
+    if part.spring is not None or part.pad is not None:
+        if not len(own):
+            raise _misses(part, samples, name)
+        areas = samples.areas[own, None, None]
+        if part.pad is not None:
+            across, sliding = part.pad
+            normal = samples.normals[own]
+            outer = normal[:, :, None] * normal[:, None, :]
+            by_area = across * outer + sliding * (np.eye(3) - outer)
+        else:
+            by_area = np.broadcast_to(np.asarray(part.spring) * np.eye(3), (len(own), 3, 3))
+        springs = areas * (along @ by_area @ along)
+        return Supports(samples.points[own], springs, np.zeros(len(own)))
+    nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
+    points = np.concatenate([nodes[part.domain.contains(nodes)], samples.points[own]])
+    if not len(points):
+        raise _misses(part, samples, name)
+    springs = np.repeat(_stiff(solid) * along[None], len(points), axis=0)
+    return Supports(points, springs, np.zeros(len(points)))
+
+
+def _at_point(part: Support, solid: Solid, name: str) -> Supports:
+    point = np.asarray(part.point, dtype=float)[None]
+    elements, weights = embedding(solid.with_supports(None), point)
+    place = (weights[0] @ solid.mesh.nodes[solid.connectivity[elements[0]]])[None]
+    distance = float(np.linalg.norm(place - point))
+    if distance > REACH * solid.mesh.edge:
+        shown = ", ".join(f"{value:.4g}" for value in point[0])
+        raise UserError(
+            f"{part.label}: the point ({shown}) m is {distance:.3g} m from solid {name!r}; "
+            "expected one of it"
+        )
+    along = np.diag(np.asarray(part.axes, dtype=float))
+    if part.mass:
+        springs = np.zeros((3, 3))
+    elif part.spring is None:
+        springs = _stiff(solid) * along
+    else:
+        springs = along @ (np.asarray(part.spring) * np.eye(3)) @ along
+    return Supports(point, springs[None], np.array([part.mass]))
+
+
+def _stiff(solid: Solid) -> float:
+    """Stiffness [N/m] of a spring that holds a point."""
+    return HELD * float(np.max(solid.young)) * solid.mesh.edge
+
+
+def _misses(part: Support, samples: _Samples, name: str) -> UserError:
+    low, high = samples.points.min(axis=0), samples.points.max(axis=0)
+    box = " and ".join(
+        f"{low[axis]:.4g} <= {letter} <= {high[axis]:.4g}" for axis, letter in enumerate("xyz")
+    )
+    return UserError(f"{part.label} meets nothing of solid {name!r}, which has {box} [m]")
+
+
+def _require_movable(parts: Sequence[Support], solid: Solid, name: str) -> None:
+    """Refuse supports that hold all of the solid."""
+    nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
+    held = np.zeros((len(nodes), 3), dtype=bool)
+    for part in parts:
+        if part.domain is None or part.spring is not None or part.pad is not None:
+            continue
+        held |= part.domain.contains(nodes)[:, None] & np.asarray(part.axes)
+    if held.all():
+        raise UserError(
+            f"all of solid {name!r} is held: nothing is left that vibrates; hold less of it"
+        )
