@@ -29,7 +29,7 @@ MOST_DIMENSIONS = 3
 WORD = 8
 """Bytes of what messages of arrays are counted in; each array begins with a new one."""
 
-_TYPES = tuple(np.dtype(name) for name in ("f8", "i8", "i4", "u1"))
+_TYPES = tuple(np.dtype(name) for name in ("f8", "i8", "i4", "u2", "u1"))
 _FIELDS = 2 + MOST_DIMENSIONS
 
 
