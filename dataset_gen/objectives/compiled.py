@@ -5,7 +5,10 @@ from pathlib import Path
 from carillon.numerics.simd import compiler
 from carillon.numerics.simd_width import REGISTERS, Registers
 
-MODULES = ("compiled", "kernel", "bounded", "descent", "free_block", "coarse_response")
+MODULES = (
+    *("compiled", "kernel", "bounded", "descent", "free_block", "coarse_response"),
+    *("inertial", "oversampled"),
+)
 """Those whose compiled functions call each other."""
 
 compiled = compiler(*(Path(__file__).parent / f"{name}.py" for name in MODULES))

@@ -12,6 +12,7 @@ from scipy.linalg import qr
 
 from carillon.arrays import Array
 from carillon.fem.block import cell_stiffness
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.numerics.simd import Vector, empty, load, spread, store
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives.compiled import compiled
@@ -48,16 +49,28 @@ class FreeBlock(NamedTuple):
 @blas_threads(1)
 def free_block_of(mask: int, poisson: float) -> FreeBlock:
     """Block of the pattern whose filled cells are the set bits of `mask` (1..255)."""
+    cells = pattern_of(mask, poisson).cells
+    return free_block_from(mask, [*cells, MEAN], cell_stiffness(poisson)[cells], poisson)
+
+
+def free_block_from(
+    mask: int, weights: list[int], stiffness: Array, poisson: float = DEFAULT_POISSON
+) -> FreeBlock:
+    """Block of the pattern `mask` from the numbers (w + 1) of its weights, that of the springs last.
+
+    `stiffness` (w, 81, 81) is what each of the others brings. Motions without strain are the same
+    for every Poisson's ratio, but for rounding.
+    """
     pattern, elimination = pattern_of(mask, poisson), elimination_of(mask)
-    dofs, cells = elimination.dofs, pattern.cells
+    dofs = elimination.dofs
     null = pattern.null[pattern.positions(dofs)]
     held = qr(null.T, mode="r", pivoting=True)[1][: null.shape[1]]
     springs = np.zeros((1, len(dofs), len(dofs)))
     springs[0, held, held] = 1.0
-    matrices = np.concatenate([cell_stiffness(poisson)[np.ix_(cells, dofs, dofs)], springs])
+    matrices = np.concatenate([stiffness[:, dofs[:, None], dofs], springs])
     tiles = lower_tiles_of(matrices, elimination.filled)
     padded = np.pad(null, ((0, 0), (0, -null.shape[1] % COLUMNS)))
-    return FreeBlock(elimination.factor, sum_of([*cells, MEAN], tiles), padded.ravel())
+    return FreeBlock(elimination.factor, sum_of(weights, tiles), padded.ravel())
 
 
 @compiled

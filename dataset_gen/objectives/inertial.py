@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.fem.element import DEFAULT_POISSON
 from carillon.numerics.simd import LANES, empty
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
@@ -82,37 +83,68 @@ def inertia_loads(mask: int, poisson: float) -> Array:
 @blas_threads(1)
 def inertia_of(mask: int, poisson: float) -> InertialTables:
     """Tables of the pattern whose filled cells are the set bits of `mask` (1..255)."""
+    return inertia_from(mask, free_block_of(mask, poisson), corner_strains(poisson), poisson)
+
+
+def inertia_from(
+    mask: int, block: FreeBlock, strains: Array, poisson: float = DEFAULT_POISSON
+) -> InertialTables:
+    """Tables of the pattern `mask`; `strains` (48, 24) are those from motions of the corners."""
     pattern = pattern_of(mask, poisson)
     order = pattern.positions(elimination_of(mask).dofs)
     motions = straining_motions()
     to_corners = pattern.without_null(pattern.to_corners.T @ motions).T
     return InertialTables(
-        block=free_block_of(mask, poisson),
+        block=block,
         loads=inertia_loads(mask, poisson)[order].ravel(),
         to_corners=to_corners[:, order].ravel(),
-        strains=(corner_strains(poisson) @ motions).ravel(),
+        strains=(strains @ motions).ravel(),
+    )
+
+
+class InertialRoom(NamedTuple):
+    """Room for the answer of a free block."""
+
+    tiles: Array
+    displacements: Array
+
+
+@compiled
+def inertial_room(inertia: InertialTables) -> InertialRoom:
+    """Room for the answers of blocks with these tables."""
+    factor, stiffness, _ = inertia.block
+    return InertialRoom(
+        empty(TILE * (len(stiffness.start) - 1)), empty(LOADS * 3 * len(factor.diagonal))
     )
 
 
 @compiled
-def _form_equations(inertia: InertialTables, young: Array, equations: NormalEquations) -> None:
+def inertial_response(
+    inertia: InertialTables, weights: Array, room: InertialRoom, motions: Array, energies: Array
+) -> None:
+    """Straining motions (24, 18) of the corners under each load, and energies (24, 24)."""
     factor, stiffness, _ = inertia.block
     size = 3 * len(factor.diagonal)
-    weights, tiles = empty(WEIGHTS), empty(TILE * (len(stiffness.start) - 1))
-    displacements = empty(LOADS * size)
+    tiles, displacements = room
+    assemble(stiffness, weights, tiles)
+    copy_in(inertia.loads, displacements)
+    factorise(factor, tiles)
+    solve_lower(factor, tiles, displacements, LOADS)
+    solve_upper(factor, tiles, displacements, LOADS)
+    fields = (displacements, 0, 1, LOADS)
+    multiply(energies, fields, (inertia.loads, 0, 1, LOADS), LOADS, LOADS, size)
+    symmetrise(energies, LOADS, 0.5)
+    multiply(motions, fields, (inertia.to_corners, 0, size, 1), LOADS, MOTIONS, size)
+
+
+@compiled
+def _form_equations(inertia: InertialTables, young: Array, equations: NormalEquations) -> None:
+    weights, room = empty(WEIGHTS), inertial_room(inertia)
     energies, motions = empty(LOADS * LOADS), empty(LOADS * MOTIONS)
     forms = empty(9 * form_sizes(LOADS)[2])
     for first in range(0, len(young), LANES):
         weigh(young, first, weights)
-        assemble(stiffness, weights, tiles)
-        copy_in(inertia.loads, displacements)
-        factorise(factor, tiles)
-        solve_lower(factor, tiles, displacements, LOADS)
-        solve_upper(factor, tiles, displacements, LOADS)
-        fields = (displacements, 0, 1, LOADS)
-        multiply(energies, fields, (inertia.loads, 0, 1, LOADS), LOADS, LOADS, size)
-        symmetrise(energies, LOADS, 0.5)
-        multiply(motions, fields, (inertia.to_corners, 0, size, 1), LOADS, MOTIONS, size)
+        inertial_response(inertia, weights, room, motions, energies)
         all_forms(motions, energies, LOADS, inertia.strains, forms)
         write_equations(forms, LOADS, first, equations)
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from carillon.fem.block import COARSE_EDGE, NODES, cell_stiffness, degrees_of_freedom
-from carillon.fem.element import CORNERS, shape_functions, uniform_stiffness
+from carillon.fem.element import CORNERS, DEFAULT_POISSON, shape_functions, uniform_stiffness
 from carillon.numerics.simd import LANES, empty, spread
 from carillon.processes.threads import blas_threads
 from dataset_gen.objectives import flops
@@ -96,10 +96,11 @@ class Patch(NamedTuple):
         )
 
 
-@cache
-@blas_threads(1)
-def octants(poisson: float) -> tuple[Array, Array]:
-    """Stiffness (8, 81, 81) and load (8, 81, 18) on the block's nodes from each octant."""
+def octants_of(cell: Array) -> tuple[Array, Array]:
+    """Stiffness (8, 81, 81) and load (8, 81, 18) on the block's nodes from each octant.
+
+    `cell` (24, 24) is the stiffness of a fine cell.
+    """
     block = degrees_of_freedom((NODES + 1) @ (1, 5, 25))
     boundary = np.setdiff1d(np.arange(3 * len(PATCH_NODES)), block)
     fields = np.kron(shape_functions((PATCH_NODES - 1) / COARSE_EDGE), np.eye(3))
@@ -107,9 +108,9 @@ def octants(poisson: float) -> tuple[Array, Array]:
     stiffness, load = np.zeros((8, 81, 81)), np.zeros((8, 81, fields.shape[1]))
     for octant, origin in enumerate(CORNERS):
         whole = np.zeros((3 * len(PATCH_NODES),) * 2)
-        for cell in 2 * origin + CORNERS:
-            dofs = degrees_of_freedom((cell + CORNERS) @ (1, 5, 25))
-            whole[np.ix_(dofs, dofs)] += uniform_stiffness(poisson)
+        for corner in 2 * origin + CORNERS:
+            dofs = degrees_of_freedom((corner + CORNERS) @ (1, 5, 25))
+            whole[np.ix_(dofs, dofs)] += cell
         stiffness[octant] = whole[np.ix_(block, block)]
         load[octant] = -whole[np.ix_(block, boundary)] @ fields[boundary]
     return stiffness, load
@@ -117,50 +118,104 @@ def octants(poisson: float) -> tuple[Array, Array]:
 
 @cache
 @blas_threads(1)
+def octants(poisson: float) -> tuple[Array, Array]:
+    """`octants_of` cells of unit modulus."""
+    return octants_of(uniform_stiffness(poisson))
+
+
+@cache
+@blas_threads(1)
 def patch_of(mask: int, poisson: float) -> Patch:
     """Patch of the pattern whose filled cells are the set bits of `mask` (1..255)."""
-    pattern, elimination = pattern_of(mask, poisson), elimination_of(mask)
-    dofs, cells = elimination.dofs, pattern.cells
-    stiffness, load = octants(poisson)
-    square = np.ix_(cells, dofs, dofs)
-    own = lower_tiles_of(cell_stiffness(poisson)[square], elimination.linked)
+    cells = pattern_of(mask, poisson).cells
+    matrices = (*octants(poisson), cell_stiffness(poisson))
+    held, loads, own = (each[cells] for each in matrices)
+    return patch_from(mask, cells, (held, loads, own), corner_strains(poisson))
+
+
+def patch_from(
+    mask: int, weights: Index, matrices: tuple[Array, Array, Array], strains: Array
+) -> Patch:
+    """Patch of the pattern `mask` from what each weight of a block brings.
+
+    Parameters
+    ----------
+    weights : (w,)
+        Numbers of the weights.
+    matrices : (w, 81, 81), (w, 81, 18), (w, 81, 81)
+        Stiffness of the patch, loads and stiffness of the block for each weight of one.
+    strains : (48, 24)
+        Strains of the coarse element from the motions of its corners.
+    """
+    pattern, elimination = pattern_of(mask, DEFAULT_POISSON), elimination_of(mask)
+    dofs, motions = elimination.dofs, straining_motions()
+    stiffness, load, block = matrices
+    square = np.ix_(np.arange(len(weights)), dofs, dofs)
+    own = lower_tiles_of(block[square], elimination.linked)
     links = lower_links(elimination.linked)
     own[:, links.tile[links.start[1:] - 1]] *= 0.5
-    motions = straining_motions()
     return Patch(
         factor=elimination.factor,
-        held=sum_of(cells, lower_tiles_of(stiffness[square], elimination.filled)),
-        loads=sum_of(cells, load[np.ix_(cells, dofs)].reshape(len(cells), -1, TILE)),
+        held=sum_of(weights, lower_tiles_of(stiffness[square], elimination.filled)),
+        loads=sum_of(weights, load[:, dofs].reshape(len(weights), -1, TILE)),
         links=links,
-        own=sum_of(cells, own),
+        own=sum_of(weights, own),
         to_corners=(motions.T @ pattern.to_corners[:, pattern.positions(dofs)]).ravel(),
-        strains=(corner_strains(poisson) @ motions).ravel(),
+        strains=(strains @ motions).ravel(),
+    )
+
+
+class PatchRoom(NamedTuple):
+    """Room for the answer of a patch."""
+
+    held: Array
+    own: Array
+    displacements: Array
+    forces: Array
+
+
+@compiled
+def patch_room(patch: Patch) -> PatchRoom:
+    """Room for the answers of patches with these tables."""
+    size = 3 * len(patch.factor.diagonal)
+    return PatchRoom(
+        empty(TILE * (len(patch.held.start) - 1)),
+        empty(TILE * (len(patch.own.start) - 1)),
+        empty(MOTIONS * size),
+        empty(MOTIONS * size),
     )
 
 
 @compiled
-def _form_equations(patch: Patch, young: Array, equations: NormalEquations) -> None:
+def patch_response(
+    patch: Patch, weights: Array, room: PatchRoom, motions: Array, energies: Array
+) -> None:
+    """Straining motions (18, 18) of the corners in each whitened field, energies (18, 18)."""
     size = 3 * len(patch.factor.diagonal)
-    weights = empty(WEIGHTS)
-    held, own = empty(TILE * (len(patch.held.start) - 1)), empty(TILE * (len(patch.own.start) - 1))
-    displacements, forces = empty(MOTIONS * size), empty(MOTIONS * size)
+    held, own, displacements, forces = room
+    assemble(patch.held, weights, held)
+    assemble(patch.loads, weights, displacements)
+    assemble(patch.own, weights, own)
+    factorise(patch.factor, held)
+    solve_lower(patch.factor, held, displacements, MOTIONS)
+    solve_upper(patch.factor, held, displacements, MOTIONS)
+    # With half of K in `own`, u^T K u is half of K's part plus its transpose.
+    multiply_sparse(patch.links, own, displacements, forces, MOTIONS)
+    fields = (displacements, 0, 1, MOTIONS)
+    multiply(energies, fields, (forces, 0, 1, MOTIONS), MOTIONS, MOTIONS, size)
+    symmetrise(energies, MOTIONS, 1.0)
+    multiply(motions, fields, (patch.to_corners, 0, size, 1), MOTIONS, MOTIONS, size)
+    _whiten(energies, motions)
+
+
+@compiled
+def _form_equations(patch: Patch, young: Array, equations: NormalEquations) -> None:
+    weights, room = empty(WEIGHTS), patch_room(patch)
     energies, motions = empty(MOTIONS * MOTIONS), empty(MOTIONS * MOTIONS)
     forms = empty(9 * form_sizes(MOTIONS)[2])
     for first in range(0, len(young), LANES):
         weigh(young, first, weights)
-        assemble(patch.held, weights, held)
-        assemble(patch.loads, weights, displacements)
-        assemble(patch.own, weights, own)
-        factorise(patch.factor, held)
-        solve_lower(patch.factor, held, displacements, MOTIONS)
-        solve_upper(patch.factor, held, displacements, MOTIONS)
-        # With half of K in `own`, u^T K u is half of K's part plus its transpose.
-        multiply_sparse(patch.links, own, displacements, forces, MOTIONS)
-        fields = (displacements, 0, 1, MOTIONS)
-        multiply(energies, fields, (forces, 0, 1, MOTIONS), MOTIONS, MOTIONS, size)
-        symmetrise(energies, MOTIONS, 1.0)
-        multiply(motions, fields, (patch.to_corners, 0, size, 1), MOTIONS, MOTIONS, size)
-        _whiten(energies, motions)
+        patch_response(patch, weights, room, motions, energies)
         all_forms(motions, energies, MOTIONS, patch.strains, forms)
         write_equations(forms, MOTIONS, first, equations)
 
