@@ -67,9 +67,9 @@ def turned(elasticity: Array, symmetry: Index) -> Array:
 
     Numbers change places and signs, no more.
     """
-    sources, signs = (each[symmetry] for each in _images())
+    sources, signs = _images()
     shape = (len(symmetry),) + (1,) * (elasticity.ndim - 3) + (6,)
-    source, sign = sources.reshape(shape), signs.reshape(shape)
+    source, sign = sources[symmetry].reshape(shape), signs[symmetry].reshape(shape)
     rows = np.take_along_axis(elasticity, source[..., :, None], axis=-2)
     both = np.take_along_axis(rows, source[..., None, :], axis=-1)
     return np.asarray(both * (sign[..., :, None] * sign[..., None, :]))

@@ -56,9 +56,9 @@ def free_block_of(mask: int, poisson: float) -> FreeBlock:
 def free_block_from(
     mask: int, weights: list[int], stiffness: Array, poisson: float = DEFAULT_POISSON
 ) -> FreeBlock:
-    """Block of the pattern `mask` from the numbers (w + 1) of its weights, that of the springs last.
+    """Block of the pattern `mask` from the numbers of its weights, that of the springs last.
 
-    `stiffness` (w, 81, 81) is what each of the others brings. Motions without strain are the same
+    `stiffness` (w, 81, 81) is what each of the w others brings. Motions without strain are the same
     for every Poisson's ratio, but for rounding.
     """
     pattern, elimination = pattern_of(mask, poisson), elimination_of(mask)

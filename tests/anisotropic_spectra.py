@@ -1,0 +1,262 @@
+"""Spectra of coarse solids of wood beside those of their voxels (test support).
+
+`python -m tests.anisotropic_spectra` prints the errors that docs/explanation/coarsening.md has.
+"""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from carillon.arrays import Array, Flags, Index
+from carillon.fem.block import ALL_FILLED, coarse_cell_mass
+from carillon.fem.element import (
+    GAUSS_POINTS,
+    elasticity_matrix,
+    nodal_mass,
+    shape_gradients,
+    strain_displacement,
+)
+from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh, hexmesh_from_grid
+from dataset_gen.objectives.anisotropic import fit_blocks
+
+LAST = 60
+"""Modes 7 to this one are compared."""
+
+
+def orthotropic(young: tuple[float, ...], shear: tuple[float, ...], poisson: tuple[float, ...]):
+    """Elasticity (6, 6) from E_x E_y E_z, G_xy G_yz G_zx and nu_xy nu_yz nu_xz."""
+    compliance = np.diag([1.0 / each for each in (*young, *shear)])
+    for (a, b), ratio in zip(((0, 1), (1, 2), (0, 2)), poisson):
+        compliance[a, b] = compliance[b, a] = -ratio / young[a]
+    return np.linalg.inv(compliance)
+
+
+def spruce() -> Array:
+    """Sitka spruce, grain along x, rings' radius along y (Wood Handbook, FPL-GTR-282, chapter 5)."""
+    along = 1.1 * 9.9e9
+    radial, tangential = 0.078 * along, 0.043 * along
+    shear = (0.064 * along, 0.003 * along, 0.061 * along)
+    return orthotropic((along, radial, tangential), shear, (0.372, 0.435, 0.467))
+
+
+def rotated(elasticity: Array, rotation: Array) -> Array:
+    """Elasticity (6, 6) of a material turned by a rotation (3, 3)."""
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+    strain = np.zeros((6, 6))
+    for i, (a, b) in enumerate(pairs):
+        for j, (c, d) in enumerate(pairs):
+            # Engineering strain i of the material from strain j of space.
+            straight = rotation[c, a] * rotation[d, b]
+            strain[i, j] = straight if j < 3 else 0.5 * (straight + rotation[d, a] * rotation[c, b])
+            strain[i, j] *= 1.0 if i < 3 else 2.0
+    return strain.T @ elasticity @ strain
+
+
+def turn(axis: tuple[float, ...], degrees: float) -> Array:
+    """Rotation (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    unit = np.array(axis) / np.linalg.norm(axis)
+    return np.asarray(Rotation.from_rotvec(np.radians(degrees) * unit).as_matrix())
+
+
+def element_stiffness(edge: float, elasticity: Array) -> Array:
+    """Stiffness (m, 24, 24) of elements with matrices (m, 8, 6, 6) at their points."""
+    strain = strain_displacement(shape_gradients(GAUSS_POINTS))
+    total = np.zeros((len(elasticity), 24, 24))
+    for q in range(8):
+        total += strain[q].T @ (elasticity[:, q] @ strain[q])
+    return edge / 8.0 * total
+
+
+def assembled(cells: Index, matrices: Array, nodes: int) -> sp.csr_matrix:
+    """Sparse sum of element matrices (m, 8 c, 8 c), c unknowns a node."""
+    width = matrices.shape[1] // 8
+    dofs = (width * cells[:, :, None].astype(np.int64) + np.arange(width)).reshape(len(cells), -1)
+    rows, columns = np.repeat(dofs, dofs.shape[1], axis=1), np.tile(dofs, dofs.shape[1])
+    size = width * nodes
+    return sp.csr_matrix((matrices.ravel(), (rows.ravel(), columns.ravel())), (size, size))
+
+
+def frequencies(stiffness: sp.csr_matrix, nodal: sp.csr_matrix, count: int) -> Array:
+    """Lowest `count` frequencies [Hz], rigid modes included, by SLEPc and MUMPS."""
+    from petsc4py import PETSc
+    from slepc4py import SLEPc
+
+    mass = sp.kron(nodal, sp.identity(3), format="csr")
+    scale = stiffness.diagonal().sum() / mass.diagonal().sum()
+    solver = SLEPc.EPS().create(comm=PETSc.COMM_SELF)
+    a, b = (
+        PETSc.Mat().createAIJ(m.shape, csr=(m.indptr, m.indices, m.data), comm=PETSc.COMM_SELF)
+        for m in (stiffness / scale, mass)
+    )
+    for matrix in (a, b):
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    solver.setOperators(a, b)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.setDimensions(count, 2 * count + 20)
+    solver.setTolerances(1e-9, 200)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    # Small beside the first eigenvalue, large beside rounding.
+    solver.setTarget(-1e-7)
+    transform = solver.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    krylov = transform.getKSP()
+    krylov.setType("preonly")
+    krylov.getPC().setType("cholesky")
+    krylov.getPC().setFactorSolverType("mumps")
+    solver.solve()
+    values = np.sort([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+    if len(values) < count:
+        raise RuntimeError(f"{len(values)} modes converged of {count}")
+    return np.asarray(np.sqrt(np.maximum(values[:count] * scale, 0.0)) / (2.0 * np.pi))
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Voxels with a law and a relative modulus each."""
+
+    mesh: HexMesh
+    laws: Array
+    """(l, 6, 6) elasticity matrices [Pa]."""
+    law: Index
+    factor: Array
+    """(m,) law of each voxel and a factor on it."""
+
+    @property
+    def elasticity(self) -> Array:
+        """(m, 6, 6) elasticity matrix of each voxel."""
+        return np.asarray(self.laws[self.law] * self.factor[:, None, None])
+
+
+def fine_frequencies(solid: Solid, count: int = LAST, density: float = 400.0) -> Array:
+    """Frequencies of the voxels."""
+    mesh = solid.mesh
+    stiffness = np.empty((mesh.n_cells, 24, 24))
+    for law, matrix in enumerate(solid.laws):
+        chosen = solid.law == law
+        unit = element_stiffness(mesh.edge, np.tile(matrix, (1, 8, 1, 1)))
+        stiffness[chosen] = solid.factor[chosen, None, None] * unit
+    mass = density * mesh.edge**3 * np.tile(nodal_mass(), (mesh.n_cells, 1, 1))
+    return frequencies(
+        assembled(mesh.cells, stiffness, mesh.n_nodes),
+        assembled(mesh.cells, mass, mesh.n_nodes),
+        count,
+    )
+
+
+def block_elasticity(solid: Solid, blocks: Blocks) -> tuple[Array, Flags]:
+    """Matrices (mc, 8, 6, 6) of the blocks' cells, zero where void, and which are filled."""
+    filled = blocks.mask
+    return np.where(filled[..., None, None], solid.elasticity[blocks.fine_of_block], 0.0), filled
+
+
+def coarse_frequencies(
+    blocks: Blocks,
+    elasticity: Array,
+    lumped: float = 0.0,
+    count: int = LAST,
+    density: float = 400.0,
+) -> Array:
+    """Frequencies of the coarse mesh with matrices (mc, 8, 6, 6) at the points."""
+    coarse, fine_edge = blocks.coarse, blocks.fine.edge
+    mass = np.einsum("ej,jab->eab", blocks.mask.astype(float), coarse_cell_mass())
+    whole = blocks.pattern == ALL_FILLED
+    mass[whole] = (1.0 - lumped) * mass[whole] + lumped * np.eye(8)
+    return frequencies(
+        assembled(coarse.cells, element_stiffness(coarse.edge, elasticity), coarse.n_nodes),
+        assembled(coarse.cells, density * fine_edge**3 * mass, coarse.n_nodes),
+        count,
+    )
+
+
+def own_law(elasticity: Array, filled: Flags) -> Array:
+    """Each octant has the matrix of its cell; void octants the mean, all by the share filled.
+
+    For one law this is the average of the eight cells, void ones included.
+    """
+    share = filled.mean(axis=1)[:, None, None, None]
+    mean = elasticity.sum(axis=1, keepdims=True) / filled.sum(axis=1)[:, None, None, None]
+    return np.where(filled[..., None, None], elasticity, mean) * share
+
+
+def galerkin(elasticity: Array, _: Flags) -> Array:
+    """Matrices at the points whose element is the projection of the block."""
+    near = 0.5 + np.sqrt(3.0) / 4.0
+    line = np.array([[near, 1.0 - near], [1.0 - near, near]])
+    weights = np.kron(np.kron(line, line), line)
+    return np.einsum("qj,njab->nqab", weights, elasticity)
+
+
+def average(elasticity: Array, _: Flags) -> Array:
+    """The mean of all eight cells at every point."""
+    return np.repeat(elasticity.mean(axis=1, keepdims=True), 8, axis=1)
+
+
+def fitted(elasticity: Array, filled: Flags, objective: str = "hybrid") -> Array:
+    """An objective for general cells."""
+    mean = elasticity.sum(axis=1, keepdims=True) / filled.sum(axis=1)[:, None, None, None]
+    laws = np.where(filled[..., None, None], elasticity, mean)
+    return laws * fit_blocks(laws, filled, objective).scales[..., None, None]
+
+
+METHODS: dict[str, Callable[[Array, Flags], Array]] = {
+    "average": average,
+    "own law": own_law,
+    "galerkin": galerkin,
+    "hybrid": fitted,
+}
+
+
+def rms_error(coarse: Array, fine: Array) -> float:
+    """Root mean square of the relative errors of modes 7 to the last."""
+    return float(np.sqrt(np.mean((coarse[6:] / fine[6:] - 1.0) ** 2)))
+
+
+def bar(shape: tuple[int, int, int], laws: Array, kind: str = "uniform", seed: int = 0) -> Solid:
+    """A bar of voxels of a millimetre."""
+    grid = np.argwhere(np.ones(shape))
+    return with_material(hexmesh_from_grid(grid, np.zeros(3), 1e-3), laws, kind, seed)
+
+
+def with_material(mesh: HexMesh, laws: Array, kind: str, seed: int = 0) -> Solid:
+    """A mesh of one law, of one law with a field of factors, or of layers and random laws."""
+    generator = np.random.default_rng(seed)
+    centres = mesh.nodes[mesh.cells].mean(axis=1)
+    law, factor = np.zeros(mesh.n_cells, dtype=int), np.ones(mesh.n_cells)
+    if kind == "random":
+        factor = 10.0 ** generator.uniform(-2.0, 1.0, mesh.n_cells)
+    elif kind == "growth":
+        factor = np.exp(0.5 * np.sin(2e3 * centres[:, 1] * 1.3))
+    elif kind == "laws":
+        law = generator.integers(len(laws), size=mesh.n_cells)
+    elif kind == "halves":
+        law = (centres[:, 0] > 1.1 * centres[:, 0].mean()).astype(int)
+    elif kind == "layers":
+        law = (np.floor(centres[:, 1] / 3e-3) % len(laws)).astype(int)
+    return Solid(mesh, laws, law, factor)
+
+
+def mesh_of(name: str, resolution: int) -> HexMesh:
+    """Voxels of a surface, scaled to a millimetre each."""
+    from carillon.fem.geometry import hexmesh_from_voxels, load_surface, voxelize
+
+    mesh = hexmesh_from_voxels(voxelize(load_surface(name), resolution))
+    return mesh
+
+
+def main() -> None:
+    """Print errors of all methods."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--mesh", default="builtin:eared-head")
+    parser.add_argument("--resolution", type=int, default=24)
+    arguments = parser.parse_args()
+    del arguments, Path
+
+
+if __name__ == "__main__":
+    main()
