@@ -16,6 +16,7 @@ from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import ALL_FILLED, coarse_cell_mass
 from carillon.fem.element import (
     GAUSS_POINTS,
+    elasticity_matrix,
     nodal_mass,
     shape_gradients,
     strain_displacement,
@@ -29,6 +30,8 @@ from carillon.fem.geometry import (
     load_surface,
     voxelize,
 )
+from carillon.processes.petsc import PETSc
+from carillon.processes.slepc import SLEPc
 from dataset_gen.objectives import lumped_share
 from dataset_gen.objectives.anisotropic import GENERAL_OBJECTIVES, fit_blocks
 
@@ -95,9 +98,6 @@ def assembled(cells: Index, matrices: Array, nodes: int) -> sp.csr_matrix:
 
 def frequencies(stiffness: sp.csr_matrix, nodal: sp.csr_matrix, count: int) -> Array:
     """Lowest `count` frequencies [Hz], rigid modes included, by SLEPc and MUMPS."""
-    from petsc4py import PETSc
-    from slepc4py import SLEPc
-
     mass = sp.kron(nodal, sp.identity(3), format="csr")
     scale = stiffness.diagonal().sum() / mass.diagonal().sum()
     solver = SLEPc.EPS().create(comm=PETSc.COMM_SELF)
@@ -122,6 +122,8 @@ def frequencies(stiffness: sp.csr_matrix, nodal: sp.csr_matrix, count: int) -> A
     krylov.getPC().setFactorSolverType("mumps")
     solver.solve()
     values = np.sort([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+    for used in (solver, a, b):
+        used.destroy()
     if len(values) < count:
         raise RuntimeError(f"{len(values)} modes converged of {count}")
     return np.asarray(np.sqrt(np.maximum(values[:count] * scale, 0.0)) / (2.0 * np.pi))
@@ -235,6 +237,16 @@ def one_law(mesh: HexMesh, law: Array) -> Solid:
     return Solid(mesh, law[None], np.zeros(mesh.n_cells, dtype=int), np.ones(mesh.n_cells))
 
 
+def two_laws(mesh: HexMesh, other: Array, chosen: Array) -> Solid:
+    """A solid of spruce, but for the voxels chosen."""
+    return Solid(mesh, np.stack([spruce(), other]), chosen.astype(int), np.ones(mesh.n_cells))
+
+
+def places(mesh: HexMesh, axis: int) -> Array:
+    """Centres (m,) of the voxels along an axis, in voxels."""
+    return np.asarray(mesh.nodes[mesh.cells][:, :, axis].mean(axis=1) / mesh.edge)
+
+
 def bar(*shape: int) -> HexMesh:
     """A bar of voxels of a millimetre."""
     return hexmesh_from_grid(np.argwhere(np.ones(shape)), np.zeros(3), 1e-3)
@@ -259,7 +271,7 @@ def print_speeds() -> None:
 
 
 def main() -> None:
-    """Print the errors of the coarse models of bars and of a solid, all of spruce."""
+    """Print the errors of the coarse models of bars and of a solid of spruce."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--mesh", default="builtin:eared-head", help="surface of the solid")
     parser.add_argument("--resolution", type=int, default=24, help="voxels along its longest edge")
@@ -272,17 +284,16 @@ def main() -> None:
     oblique = rotated(spruce(), turn((0, 0, 1), 20))
     slanted = rotated(spruce(), turn((1, 2, 3), 50))
     long, odd = bar(48, 12, 8), bar(47, 11, 7)
-    halves = Solid(
-        long,
-        np.stack([spruce(), 1.3 * slanted]),
-        (long.nodes[long.cells].mean(axis=1)[:, 0] > 0.025).astype(int),
-        np.ones(long.n_cells),
-    )
+    crossed = rotated(spruce(), turn((0, 1, 0), 90))
+    steel = 2e11 * elasticity_matrix(0.3)
+    by_length, by_height = places(long, 0) > 25, places(long, 1) // 3 % 2
     cases = {
         "bar 48x12x8, grain along it": one_law(long, spruce()),
         "bar 48x12x8, grain 20 degrees off": one_law(long, oblique),
         "bar 47x11x7, grain along it": one_law(odd, spruce()),
-        "bar 48x12x8, two woods glued": halves,
+        "bar 48x12x8, two woods glued": two_laws(long, 1.3 * slanted, by_length),
+        "bar 48x12x8, layers crossed": two_laws(long, crossed, by_height),
+        "bar 48x12x8, layers of spruce and steel": two_laws(long, steel, by_height),
         f"{arguments.mesh} at {arguments.resolution}, grain slanted": one_law(solid, slanted),
     }
     print(f"{'':45s}" + " ".join(f"{name:>10s}" for name in METHODS))

@@ -8,7 +8,6 @@ import pytest
 from carillon.errors import UserError
 from carillon.fem.block import ALL_FILLED, CELL_NODES, NODES, degrees_of_freedom, symmetries
 from carillon.fem.element import CORNERS, elasticity_matrix, shape_functions
-from carillon.fem.geometry import blocks_from_mesh
 from dataset_gen.objectives import fit, general_cells, inertial
 from dataset_gen.objectives.anisotropic import GENERAL_OBJECTIVES, fit_blocks
 from dataset_gen.objectives.elasticity import filled_mean, stiffness_size, turned, unit_cells
@@ -19,14 +18,15 @@ from dataset_gen.sampling import pattern_classes, samples
 from solver.coarsening.anisotropic import AnisotropicCoarsening, octant_laws
 from solver.coarsening.choice import make_coarsening
 from tests.anisotropic_spectra import (
-    Solid,
     bar,
     element_stiffness,
     errors,
     one_law,
+    places,
     rotated,
     spruce,
     turn,
+    two_laws,
 )
 
 EVERY = pytest.mark.parametrize("objective", GENERAL_OBJECTIVES)
@@ -292,8 +292,5 @@ def oblique():
 
 def test_a_coarse_solid_of_two_woods_is_better_than_its_average():
     mesh = bar(20, 8, 6)
-    law = (mesh.nodes[mesh.cells].mean(axis=1)[:, 0] > 0.011).astype(int)
-    solid = Solid(mesh, np.stack([spruce(), oblique()]), law, np.ones(mesh.n_cells))
-    assert (blocks_from_mesh(mesh).mask).all()
-    rms = errors(solid)
+    rms = errors(two_laws(mesh, oblique(), places(mesh, 0) > 11))
     assert rms["calibrated"] < 0.5 * min(rms["average"], rms["galerkin"])
