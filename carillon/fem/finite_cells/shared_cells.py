@@ -8,36 +8,19 @@ polynomial does not follow.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.cells import FLOOR, FiniteCells
-from carillon.fem.finite_cells.shapes import (
-    OCTANTS,
-    POINT_PLACES,
-    POINTS,
-    lagrange,
-    octant_weights,
-)
+from carillon.fem.finite_cells.region_lines import InsideAt, Octants, RegionsAt, parts_of_octants
+from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.regions import RegionOf, Regions
-
-RegionsAt = Callable[[Array], NDArray[np.integer]]
-"""Region (p,) of points (p, 3) [m]; -1 where there is none."""
 
 SAMPLES = (0.02, 0.5, 0.98)
 """Places along a voxel's edge at which regions are looked for."""
-STEPS = 8
-"""Intervals of a line across a voxel, at whose ends regions are compared."""
-BISECTIONS = 24
-LINES = 2
-"""Groups of Gauss points, in which the lines across a voxel lie, along each of its edges."""
-AT_ONCE = 500_000
-"""Points whose regions are found at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +37,7 @@ class SharedCells:
 
 
 def regions_of_cells(
-    cells: FiniteCells, regions_at: RegionsAt, inside: Callable[[Array], NDArray[np.bool_]]
+    cells: FiniteCells, regions_at: RegionsAt, inside: InsideAt
 ) -> tuple[RegionOf, SharedCells | None, NDArray[np.bool_]]:
     """Region (m,) that most of each voxel is of, parts of those that several share, and which (m,)
     voxels are of none.
@@ -62,24 +45,21 @@ def regions_of_cells(
     `inside` tells whether points (p, 3) [m] are inside the solid's surface.
     """
     cell, octant = np.nonzero(cells.voxels >= 0)
-    frames = _Frames(cells, cell, octant)
+    octants = Octants(cells, cell, octant)
     offsets = np.array([[x, y, z] for z in SAMPLES for y in SAMPLES for x in SAMPLES])
-    seen = _at(frames, np.broadcast_to(offsets, (len(cell), *offsets.shape)), regions_at)
-    cut = np.flatnonzero(~_is_whole(cells, cell, octant))
+    seen = octants.sampled(offsets, regions_at)
+    cut = np.flatnonzero(octants.is_cut)
     mixed = cut[_varies(seen[cut])]
     if len(mixed):
-        few = _Frames(cells, cell[mixed], octant[mixed])
-        chosen = np.broadcast_to(offsets, (len(mixed), *offsets.shape))
-        outside = ~_at(few, chosen, inside).astype(bool)
-        left = np.where(outside, -1, seen[mixed])
+        is_inside = octants.some(mixed).sampled(offsets, inside).astype(bool)
+        left = np.where(is_inside, seen[mixed], -1)
         # Too thin for the samples: all of them count.
         seen[mixed] = np.where((left < 0).all(axis=1, keepdims=True), seen[mixed], left)
-    region = np.array([_most(row) for row in seen])
+    region = seen.max(axis=1)
     split = np.flatnonzero(_varies(seen))
     shared = None
     if len(split):
-        few = _Frames(cells, cell[split], octant[split])
-        shared = _split(cells, few, seen[split], regions_at, inside)
+        shared = _split(octants.some(split), seen[split], regions_at, inside)
         volume = np.zeros((len(cell), int(seen.max()) + 1))
         row = np.zeros(cells.voxels.shape, dtype=np.int64)
         row[cell, octant] = np.arange(len(cell))
@@ -114,21 +94,21 @@ def point_values(
     law, slot = _slots(cells, own, whole, shared)
     values = np.zeros((*law.shape, POINTS))
     volume, total = np.zeros(law.shape), np.zeros(law.shape)
-
-    def add(cell: Index, at: Index, value: Array, weights: Array) -> None:
-        np.add.at(values, (cell, at), value[:, None] * weights)
-        share = weights.sum(axis=1)
-        np.add.at(volume, (cell, at), share)
-        np.add.at(total, (cell, at), value * share)
-
+    shares = cells.weights.sum(axis=2)
     for octant in range(OCTANTS):
         cell = np.flatnonzero(whole[:, octant])
-        weights = cells.weights[cells.row[cell], octant]
-        add(cell, slot[cell, octant], of_voxel[cells.voxels[cell, octant]], weights)
+        row, at = cells.row[cell], slot[cell, octant]
+        value = of_voxel[cells.voxels[cell, octant]]
+        values[cell, at] += value[:, None] * cells.weights[row, octant]
+        volume[cell, at] += shares[row, octant]
+        total[cell, at] += value * shares[row, octant]
     if shared is not None:
         assert of_part is not None
         at = (law[shared.cell] == shared.region[:, None]).argmax(axis=1)
-        add(shared.cell, at, of_part, shared.weights)
+        share = shared.weights.sum(axis=1)
+        np.add.at(values, (shared.cell, at), of_part[:, None] * shared.weights)
+        np.add.at(volume, (shared.cell, at), share)
+        np.add.at(total, (shared.cell, at), of_part * share)
     main = volume.argmax(axis=1)
     mean = total.sum(axis=1) / volume.sum(axis=1)
     everything = octant_weights().sum(axis=0)
@@ -180,39 +160,6 @@ def _slots(
     return law.astype(np.uint16), slot
 
 
-@dataclass(frozen=True)
-class _Frames:
-    """Octants of cells as cubes."""
-
-    cells: FiniteCells
-    cell: Index
-    octant: Index
-    """(k,) which."""
-
-    def corner(self) -> tuple[Array, Array]:
-        """Lowest corners (k, 3) and edges (k,) [m]."""
-        mesh = self.cells.mesh
-        edge = self.cells.span[self.cell] / 2.0
-        lowest = self.cells.grid[self.cell] + edge[:, None] * CORNERS[self.octant]
-        return mesh.origin + mesh.edge * lowest, mesh.edge * edge
-
-
-def _at(frames: _Frames, offsets: Array, function: Callable[[Array], NDArray]) -> NDArray[np.int64]:  # type: ignore[type-arg]
-    """Values (k, p) of a function at places (k, p, 3) in octants, from 0 to 1."""
-    corner, edge = frames.corner()
-    found = np.empty(offsets.shape[:2], dtype=np.int64)
-    step = max(1, AT_ONCE // offsets.shape[1])
-    for first in range(0, len(corner), step):
-        few = slice(first, first + step)
-        places = corner[few, None] + edge[few, None, None] * offsets[few]
-        found[few] = function(places.reshape(-1, 3)).reshape(places.shape[:2])
-    return found
-
-
-def _is_whole(cells: FiniteCells, cell: Index, octant: Index) -> NDArray[np.bool_]:
-    return np.asarray(cells.fractions[cell, octant] > 1.0 - 1e-9)
-
-
 def _varies(seen: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether samples (k, p) are of several regions, those of none aside."""
     most = seen.max(axis=1)
@@ -226,75 +173,24 @@ def _most(row: NDArray[np.int64]) -> int:
 
 
 def _split(
-    cells: FiniteCells,
-    frames: _Frames,
-    seen: NDArray[np.int64],
-    regions_at: RegionsAt,
-    inside: Callable[[Array], NDArray[np.bool_]],
+    octants: Octants, seen: NDArray[np.int64], regions_at: RegionsAt, inside: InsideAt
 ) -> SharedCells:
-    """Parts of octants that lines across them find."""
-    whole = _is_whole(cells, frames.cell, frames.octant)
-    axes = _axes_across(seen)
-    places, shares = _across()
-    rows: list[NDArray[np.int64]] = []
-    columns: list[NDArray[np.int64]] = []
-    parts: list[Array] = []
-    # A few octants at a time, each with all of its lines.
-    step = max(1, AT_ONCE // (len(places) * (STEPS + 1)))
-    for first in range(0, len(frames.cell), step):
-        few = np.arange(first, min(first + step, len(frames.cell)))
-        some = _Frames(cells, frames.cell[few], frames.octant[few])
-
-        def at(line: Index, along: Array, some: _Frames = some, few: Index = few) -> Index:
-            """Regions at places along lines; -1 outside the solid."""
-            octant, number = np.divmod(line, len(places))
-            axis = axes[few][octant]
-            local = np.empty((len(line), 3))
-            turned = (axis[:, None] + np.arange(3)) % 3
-            both = np.concatenate([along[:, None], places[number]], axis=1)
-            np.put_along_axis(local, turned, both, axis=1)
-            corner, edge = some.corner()
-            point = corner[octant] + edge[octant, None] * local
-            found = regions_at(point).astype(np.int64)
-            cut = np.flatnonzero(~whole[few][octant])
-            if len(cut):
-                found[cut[~inside(point[cut])]] = -1
-            return found
-
-        line, low, high, region = _pieces(at, len(few) * len(places))
-        octant, number = np.divmod(line, len(places))
-        own = frames.octant[few][octant]
-        axis = axes[few][octant]
-        weights = _integrals(own, axis, places[number], low, high) * (shares[number] * 1.0)[:, None]
-        key, where = np.unique(np.stack([few[octant], region], axis=1), axis=0, return_inverse=True)
-        summed = np.zeros((len(key), POINTS))
-        np.add.at(summed, where.ravel(), weights)
-        rows.append(key[:, 0])
-        columns.append(key[:, 1])
-        parts.append(summed)
-    row, region, weights = np.concatenate(rows), np.concatenate(columns), np.concatenate(parts)
-    most = np.array([_most(samples) for samples in seen])
-    return _complete(cells, frames, row, region, weights, most)
-
-
-def _complete(
-    cells: FiniteCells, frames: _Frames, row: Index, region: Index, weights: Array, most: Index
-) -> SharedCells:
-    """The parts, with what lines missed of an octant in the largest of it, or in region `most`."""
-    exact = cells.weights[cells.row[frames.cell], frames.octant]
+    """Parts of octants; what the lines miss is of the largest part, or of the commonest sample."""
+    row, region, weights = parts_of_octants(octants, _axes_across(seen), regions_at, inside)
+    exact = octants.weights
     found = np.zeros_like(exact)
     np.add.at(found, row, weights)
-    volume = weights.sum(axis=1)
     largest = np.full(len(exact), -1)
-    order = np.argsort(volume, kind="stable")
+    order = np.argsort(weights.sum(axis=1), kind="stable")
     largest[row[order]] = order
     missed = np.flatnonzero(largest < 0)
     if len(missed):  # slivers between the lines
         largest[missed] = len(row) + np.arange(len(missed))
-        row, region = np.append(row, missed), np.append(region, most[missed])
+        most = [_most(samples) for samples in seen[missed]]
+        row, region = np.append(row, missed), np.append(region, most)
         weights = np.concatenate([weights, np.zeros((len(missed), POINTS))])
     weights[largest] += exact - found
-    return SharedCells(frames.cell[row], frames.octant[row], region.astype(np.uint16), weights)
+    return SharedCells(octants.cell[row], octants.octant[row], region.astype(np.uint16), weights)
 
 
 def _axes_across(seen: NDArray[np.int64]) -> Index:
@@ -302,67 +198,7 @@ def _axes_across(seen: NDArray[np.int64]) -> Index:
     cube = seen.reshape(-1, 3, 3, 3)
     counts = []
     for axis in (3, 2, 1):
-        low = np.take(cube, [0, 1], axis=axis)
-        high = np.take(cube, [1, 2], axis=axis)
+        low, high = (np.take(cube, places, axis=axis) for places in ([0, 1], [1, 2]))
         changes = (low != high) & (low >= 0) & (high >= 0)
         counts.append(changes.sum(axis=(1, 2, 3)))
     return np.asarray(np.stack(counts, axis=1).argmax(axis=1))
-
-
-def _across() -> tuple[Array, Array]:
-    """Places (l, 2) of the lines across a voxel, and their shares of it (l,)."""
-    nodes, shares = np.polynomial.legendre.leggauss(4)
-    starts = np.arange(LINES) / LINES
-    place = (starts[:, None] + (nodes + 1.0) / (2.0 * LINES)).ravel()
-    share = np.tile(shares / (2.0 * LINES), LINES)
-    first, second = np.meshgrid(place, place, indexing="ij")
-    return np.stack([first.ravel(), second.ravel()], axis=1), np.outer(share, share).ravel()
-
-
-def _pieces(at: Callable[[Index, Array], Index], lines: int) -> tuple[Index, Array, Array, Index]:
-    """Pieces of lines, each of one region: line, begin and end from 0 to 1, and region."""
-    ends = np.linspace(0.0, 1.0, STEPS + 1)
-    inset = np.clip(ends, 1e-6, 1.0 - 1e-6)
-    line = np.repeat(np.arange(lines), STEPS + 1)
-    region = at(line, np.tile(inset, lines)).reshape(lines, STEPS + 1)
-    number, step = np.nonzero(region[:, 1:] != region[:, :-1])
-    low, high = ends[step].copy(), ends[step + 1].copy()
-    left = region[number, step]
-    for _ in range(BISECTIONS if len(number) else 0):
-        middle = 0.5 * (low + high)
-        same = at(number, middle) == left
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    border = 0.5 * (low + high)
-    # Begin and end of the pieces, line by line.
-    begins = np.concatenate(
-        [np.stack([np.arange(lines), np.zeros(lines)], 1), np.stack([number, border], 1)]
-    )
-    of = np.concatenate([region[:, 0], region[number, step + 1]])
-    order = np.lexsort((begins[:, 1], begins[:, 0]))
-    line, begin, of = begins[order, 0].astype(np.int64), begins[order, 1], of[order]
-    last = np.append(line[1:] != line[:-1], True)
-    end = np.where(last, 1.0, np.append(begin[1:], 1.0))
-    kept = (of >= 0) & (end > begin)
-    return line[kept], begin[kept], end[kept], of[kept]
-
-
-def _integrals(octant: Index, axis: Index, across: Array, low: Array, high: Array) -> Array:
-    """Integrals (p, 125) of the points' Lagrange polynomials over pieces of lines in octants."""
-    nodes, shares = np.polynomial.legendre.leggauss(3)
-    length = high - low
-    half = CORNERS[octant]
-    along = np.zeros((len(octant), 5))
-    of_axis = half[np.arange(len(octant)), axis]
-    for node, share in zip(nodes, shares, strict=True):
-        place = (of_axis + low + length * (node + 1.0) / 2.0) / 2.0
-        along += (0.5 * share * length)[:, None] * lagrange(POINT_PLACES, place)
-    factors = np.empty((len(octant), 3, 5))
-    rows = np.arange(len(octant))
-    factors[rows, axis] = along
-    for number in (1, 2):
-        other = (axis + number) % 3
-        place = (half[rows, other] + across[:, number - 1]) / 2.0
-        factors[rows, other] = lagrange(POINT_PLACES, place)
-    product = np.einsum("pk,pj,pi->pkji", factors[:, 2], factors[:, 1], factors[:, 0])
-    # An octant has an eighth of the cell.
-    return np.asarray(product.reshape(len(octant), POINTS) / OCTANTS)

@@ -1,0 +1,218 @@
+"""Lines across voxels, divided where the region changes, and what is integrated along them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from carillon.arrays import Array, Flags, Index
+from carillon.fem.element import CORNERS
+from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.shapes import OCTANTS, POINT_PLACES, POINTS, lagrange
+
+RegionsAt = Callable[[Array], NDArray[np.integer]]
+"""Region (p,) of points (p, 3) [m]; -1 where there is none."""
+InsideAt = Callable[[Array], NDArray[np.bool_]]
+"""Whether points (p, 3) [m] are inside the solid."""
+
+STEPS = 8
+"""Intervals of a line across a voxel, at whose ends regions are compared."""
+BISECTIONS, BISECTIONS_OF_SURFACE = 24, 7
+"""Bisections for a border of regions, and for the solid's surface, whose volume is known."""
+GROUPS = 2
+"""Groups of four Gauss points, in which the lines across a voxel lie, along each of its edges."""
+AT_ONCE = 500_000
+"""Points whose regions are found at once."""
+
+
+@dataclass(frozen=True)
+class Octants:
+    """Octants of finite cells."""
+
+    cells: FiniteCells
+    cell: Index
+    octant: Index
+    """(k,) which."""
+
+    def some(self, chosen: Index) -> Octants:
+        """A few of them."""
+        return Octants(self.cells, self.cell[chosen], self.octant[chosen])
+
+    @property
+    def weights(self) -> Array:
+        """Weights (k, 125) of the cells' points, see `FiniteCells`."""
+        return np.asarray(self.cells.weights[self.cells.row[self.cell], self.octant])
+
+    @cached_property
+    def is_cut(self) -> Flags:
+        """Which (k,) the surface cuts."""
+        return np.asarray(self.cells.fractions[self.cell, self.octant] <= 1.0 - 1e-9)
+
+    @cached_property
+    def frames(self) -> tuple[Array, Array]:
+        """Lowest corners (k, 3) and edges (k,) [m]."""
+        mesh = self.cells.mesh
+        edge = self.cells.span[self.cell] / 2.0
+        lowest = self.cells.grid[self.cell] + edge[:, None] * CORNERS[self.octant]
+        return mesh.origin + mesh.edge * lowest, mesh.edge * edge
+
+    def sampled(self, offsets: Array, function: Callable[[Array], NDArray]) -> NDArray[np.int64]:  # type: ignore[type-arg]
+        """Values (k, p) of a function at places `offsets` (p, 3) in them, from 0 to 1."""
+        corner, edge = self.frames
+        found = np.empty((len(corner), len(offsets)), dtype=np.int64)
+        step = max(1, AT_ONCE // len(offsets))
+        for first in range(0, len(corner), step):
+            few = slice(first, first + step)
+            places = corner[few, None] + edge[few, None, None] * offsets
+            found[few] = function(places.reshape(-1, 3)).reshape(places.shape[:2])
+        return found
+
+
+def parts_of_octants(
+    octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt
+) -> tuple[Index, NDArray[np.integer], Array]:
+    """Parts of octants by region: octants (e,), regions (e,), and weights (e, 125).
+
+    Lines across the octant along `axis` (k,) find them.
+    """
+    found = []
+    # A few octants at a time, each with all of its lines.
+    step = max(1, AT_ONCE // (len(_across()[0]) * (STEPS + 1)))
+    for first in range(0, len(axis), step):
+        few = np.arange(first, min(first + step, len(axis)))
+        row, region, weights = _parts(octants.some(few), axis[few], regions_at, inside)
+        found.append((few[row], region, weights))
+    rows, regions, parts = (np.concatenate(each) for each in zip(*found, strict=True))
+    return rows, regions, parts
+
+
+def _parts(
+    octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt
+) -> tuple[Index, NDArray[np.integer], Array]:
+    places, shares = _across()
+    lines = _Lines(octants, axis, places, regions_at, inside)
+    line, low, high, region = _pieces(lines, len(axis) * len(places))
+    octant, number = np.divmod(line, len(places))
+    weights = _integrals(octants.octant[octant], axis[octant], places[number], low, high)
+    pairs = np.stack([octant, region], axis=1)
+    key, where = np.unique(pairs, axis=0, return_inverse=True)
+    summed = np.zeros((len(key), POINTS))
+    np.add.at(summed, where.ravel(), shares[number, None] * weights)
+    return key[:, 0], key[:, 1], summed
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Lines across octants, those of an octant one after the other."""
+
+    octants: Octants
+    axis: Index
+    places: Array
+    regions_at: RegionsAt
+    inside: InsideAt
+
+    def points(self, line: Index, along: Array) -> Array:
+        """Points (p, 3) [m] on lines (p,), at places along them from 0 to 1."""
+        octant, number = np.divmod(line, len(self.places))
+        local = np.empty((len(line), 3))
+        turned = (self.axis[octant, None] + np.arange(3)) % 3
+        both = np.concatenate([along[:, None], self.places[number]], axis=1)
+        np.put_along_axis(local, turned, both, axis=1)
+        corner, edge = self.octants.frames
+        return np.asarray(corner[octant] + edge[octant, None] * local)
+
+    def are_cut(self, line: Index) -> Flags:
+        """Which lines (p,) are in octants that the surface cuts."""
+        return self.octants.is_cut[line // len(self.places)]
+
+    def regions(self, line: Index, along: Array) -> NDArray[np.int64]:
+        """Regions (p,) at places along lines; -1 outside the solid."""
+        point = self.points(line, along)
+        found = self.regions_at(point).astype(np.int64)
+        cut = np.flatnonzero(self.are_cut(line))
+        if len(cut):
+            found[cut[~self.inside(point[cut])]] = -1
+        return found
+
+    def border(self, line: Index, low: Array, high: Array, left: NDArray[np.int64]) -> Array:
+        """Places (p,) between `low` and `high` where lines leave the regions `left` (p,)."""
+
+        def same(middle: Array) -> Flags:
+            return np.asarray(self.regions_at(self.points(line, middle)) == left)
+
+        return _bisected(same, low, high, BISECTIONS)
+
+    def surface(self, line: Index, low: Array, high: Array, began_inside: Flags) -> Array:
+        """Places (p,) where lines cross the solid's surface."""
+
+        def same(middle: Array) -> Flags:
+            return np.asarray(self.inside(self.points(line, middle)) == began_inside)
+
+        return _bisected(same, low, high, BISECTIONS_OF_SURFACE)
+
+
+def _bisected(same: Callable[[Array], Flags], low: Array, high: Array, steps: int) -> Array:
+    for _ in range(steps if len(low) else 0):
+        middle = 0.5 * (low + high)
+        here = same(middle)
+        low, high = np.where(here, middle, low), np.where(here, high, middle)
+    return 0.5 * (low + high)
+
+
+def _pieces(lines: _Lines, count: int) -> tuple[Index, Array, Array, NDArray[np.int64]]:
+    """Pieces of lines, each of one region: line, begin and end from 0 to 1, and region."""
+    ends = np.linspace(0.0, 1.0, STEPS + 1)
+    every = np.repeat(np.arange(count), STEPS + 1)
+    inset = np.clip(ends, 1e-6, 1.0 - 1e-6)
+    region = lines.regions(every, np.tile(inset, count)).reshape(count, STEPS + 1)
+    number, step = np.nonzero(region[:, 1:] != region[:, :-1])
+    left, right = region[number, step], region[number, step + 1]
+    low, high = ends[step], ends[step + 1]
+    border = np.empty(len(number))
+    within = (left >= 0) & (right >= 0)
+    border[within] = lines.border(number[within], low[within], high[within], left[within])
+    out = ~within
+    border[out] = lines.surface(number[out], low[out], high[out], left[out] >= 0)
+    # Begin and end of the pieces, line by line.
+    line = np.concatenate([np.arange(count), number])
+    begin = np.concatenate([np.zeros(count), border])
+    of = np.concatenate([region[:, 0], right])
+    order = np.lexsort((begin, line))
+    line, begin, of = line[order], begin[order], of[order]
+    last = np.append(line[1:] != line[:-1], True)
+    end = np.where(last, 1.0, np.append(begin[1:], 1.0))
+    kept = (of >= 0) & (end > begin)
+    return line[kept], begin[kept], end[kept], of[kept]
+
+
+def _across() -> tuple[Array, Array]:
+    """Places (l, 2) of the lines across a voxel, and their shares of it (l,)."""
+    nodes, shares = np.polynomial.legendre.leggauss(4)
+    starts = np.arange(GROUPS) / GROUPS
+    place = (starts[:, None] + (nodes + 1.0) / (2.0 * GROUPS)).ravel()
+    share = np.tile(shares / (2.0 * GROUPS), GROUPS)
+    first, second = np.meshgrid(place, place, indexing="ij")
+    return np.stack([first.ravel(), second.ravel()], axis=1), np.outer(share, share).ravel()
+
+
+def _integrals(octant: Index, axis: Index, across: Array, low: Array, high: Array) -> Array:
+    """Integrals (p, 125) of the points' Lagrange polynomials over pieces of lines in octants."""
+    nodes, shares = np.polynomial.legendre.leggauss(3)
+    half, rows, length = CORNERS[octant], np.arange(len(octant)), high - low
+    along = np.zeros((len(octant), 5))
+    for node, share in zip(nodes, shares, strict=True):
+        place = (half[rows, axis] + low + length * (node + 1.0) / 2.0) / 2.0
+        along += (0.5 * share * length)[:, None] * lagrange(POINT_PLACES, place)
+    factors = np.empty((len(octant), 3, 5))
+    factors[rows, axis] = along
+    for number in (1, 2):
+        other = (axis + number) % 3
+        place = (half[rows, other] + across[:, number - 1]) / 2.0
+        factors[rows, other] = lagrange(POINT_PLACES, place)
+    product = np.einsum("pk,pj,pi->pkji", factors[:, 2], factors[:, 1], factors[:, 0])
+    # An octant has an eighth of the cell.
+    return np.asarray(product.reshape(len(octant), POINTS) / OCTANTS)
