@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array, Surface
-from carillon.composition.domains import Domain
+from carillon.composition.domains import ClosedSurface, Domain
 from carillon.errors import UserError
-from carillon.fem.embedding import embedding
 from carillon.fem.model import Solid
 from carillon.fem.supports import Supports
 
@@ -23,7 +22,7 @@ SLIGHT = 1e-6
 """Distance outside a surface, in sides of the solid, at which it is asked for, too: a face is of
 what begins there."""
 REACH = 1.5
-"""Largest distance of a named point from the solid, in lattice spacings."""
+"""Largest distance of a named point outside the solid, in lattice spacings."""
 ALL = (True, True, True)
 
 
@@ -63,7 +62,7 @@ def placed_supports(
     if not parts:
         return None
     samples = _Samples.of_surface(surface, SAMPLE * solid.mesh.edge)
-    found = [_placed(part, solid, samples, name) for part in parts]
+    found = [_placed(part, solid, surface, samples, name) for part in parts]
     supports = Supports.together(found)
     _require_movable(parts, solid, name)
     return supports
@@ -102,9 +101,11 @@ class _Samples:
         return np.flatnonzero(np.any(near, axis=0))
 
 
-def _placed(part: Support, solid: Solid, samples: _Samples, name: str) -> Supports:
+def _placed(
+    part: Support, solid: Solid, surface: Surface, samples: _Samples, name: str
+) -> Supports:
     if part.point is not None:
-        return _at_point(part, solid, name)
+        return _at_point(part, solid, surface, name)
     assert part.domain is not None
     own = samples.inside(part.domain)
     along = np.diag(np.asarray(part.axes, dtype=float))
@@ -129,17 +130,9 @@ def _placed(part: Support, solid: Solid, samples: _Samples, name: str) -> Suppor
     return Supports(points, springs, np.zeros(len(points)))
 
 
-def _at_point(part: Support, solid: Solid, name: str) -> Supports:
-    point = np.asarray(part.point, dtype=float)[None]
-    elements, weights = embedding(solid.with_supports(None), point)
-    place = (weights[0] @ solid.mesh.nodes[solid.connectivity[elements[0]]])[None]
-    distance = float(np.linalg.norm(place - point))
-    if distance > REACH * solid.mesh.edge:
-        shown = ", ".join(f"{value:.4g}" for value in point[0])
-        raise UserError(
-            f"{part.label}: the point ({shown}) m is {distance:.3g} m from solid {name!r}; "
-            "expected one of it"
-        )
+def _at_point(part: Support, solid: Solid, surface: Surface, name: str) -> Supports:
+    assert part.point is not None
+    point = _in_solid(part, np.array(part.point, dtype=float), solid, surface, name)
     along = np.diag(np.asarray(part.axes, dtype=float))
     if part.mass:
         springs = np.zeros((3, 3))
@@ -147,7 +140,27 @@ def _at_point(part: Support, solid: Solid, name: str) -> Supports:
         springs = _stiff(solid) * along
     else:
         springs = along @ (np.asarray(part.spring) * np.eye(3)) @ along
-    return Supports(point, springs[None], np.array([part.mass]))
+    return Supports(point[None], springs[None], np.array([part.mass]))
+
+
+def _in_solid(part: Support, point: Array, solid: Solid, surface: Surface, name: str) -> Array:
+    """A point (3,) [m] if it is in the solid, or the nearest one of the surface."""
+    if ClosedSurface(surface).contains(point[None])[0]:
+        return point
+    import igl
+
+    faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
+    square, _, nearest = igl.point_mesh_squared_distance(
+        point[None], np.ascontiguousarray(surface.vertices), faces
+    )[:3]
+    distance, place = float(np.sqrt(np.ravel(square)[0])), np.reshape(nearest, 3)
+    if distance > REACH * solid.mesh.edge:
+        shown, other = (", ".join(f"{value:.4g}" for value in each) for each in (point, place))
+        raise UserError(
+            f"{part.label}: the point ({shown}) m is {distance:.3g} m off solid {name!r}; expected "
+            f"one of it, the nearest is ({other}) m"
+        )
+    return np.asarray(place)
 
 
 def _stiff(solid: Solid) -> float:
