@@ -19,6 +19,7 @@ from dataset_gen import objectives, sampling
 from dataset_gen.objectives import (
     DATASET_OBJECTIVES,
     DEFAULT_OBJECTIVE,
+    fitted_at,
     require_objective,
     require_poisson,
 )
@@ -59,7 +60,9 @@ class ShardOptions:
     shard: Number = option(0, "number of this shard")
     shards: Count = option(1, "number of all shards")
     objective: Annotated[str, OneOf(*DATASET_OBJECTIVES)] = option(DEFAULT_OBJECTIVE, "of the fits")
-    poisson: PoissonRatio = option(DEFAULT_POISSON, "Poisson's ratio")
+    poisson: PoissonRatio = option(
+        DEFAULT_POISSON, "Poisson's ratio of the solids; calibrated serves 0 to 0.49 by one fit"
+    )
     distribution: Annotated[str, OneOf(*DISTRIBUTIONS)] = option("uniform", "of the fine moduli")
     low: NonNegative | None = option(None, "least modulus [GPa] (0 or 0.01)")
     high: Positive | None = option(None, "largest modulus [GPa] (10 or 1000)")
@@ -69,7 +72,8 @@ class ShardOptions:
 class Settings:
     """Samples start..stop-1 of a seed, their moduli drawn in low..high [GPa], and how to fit them.
 
-    Equal settings give equal rows on one kind of machine, however the work is divided.
+    `poisson` is the ratio of the fits, which `calibrated` has one of for all solids. Equal settings
+    give equal rows on one kind of machine, however the work is divided.
     """
 
     objective: str
@@ -124,14 +128,14 @@ def settings_of(options: ShardOptions) -> Settings:
     moduli or Poisson's ratio.
     """
     require_objective(options.objective, DATASET_OBJECTIVES)
-    require_poisson(options.poisson)
+    require_poisson(options.objective, options.poisson)
     if not 0 <= options.seed < 1 << SEED_BITS:
         raise UserError(f"seed {options.seed}: expected 0 or more, and less than 2^{SEED_BITS}")
     drawn = moduli(options.distribution, options.low, options.high)
     start, stop = shard_range(options.samples, options.shard, options.shards)
     return Settings(
         objective=options.objective,
-        poisson=float(options.poisson),
+        poisson=fitted_at(options.objective, float(options.poisson)),
         seed=options.seed,
         start=start,
         stop=stop,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from carillon.errors import UserError
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
+from dataset_gen.objectives import ratios_of
 from forests import default
 from forests.layout import FEATURE_BITS, FEATURE_MASK, NODE, aligned
 from forests.scaling import FEATURES, PATTERNS, TRANSFORMS
@@ -60,7 +61,7 @@ class Model:
 
     objective: str
     poisson: float
-    """Objective and Poisson's ratio of the fits."""
+    """Objective and Poisson's ratio of the fits, which may serve solids of others: `ratios`."""
     transform: str
     """Of the features and the target, one of `forests.scaling.TRANSFORMS`."""
     forests: Forests
@@ -68,6 +69,11 @@ class Model:
     """On samples that were held out, by name."""
     provenance: dict[str, Any]
     """Of the training, by name."""
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Least and largest Poisson's ratio of the solids that the forests are for."""
+        return ratios_of(self.objective, self.poisson)
 
     @property
     def nbytes(self) -> int:
@@ -141,8 +147,8 @@ def load_model(path: str | Path | None = None) -> Model:
     Examples
     --------
     >>> model = load_model()
-    >>> model.objective, model.poisson, model.forests.trees
-    ('calibrated', 0.25, 3)
+    >>> model.objective, model.ratios, model.forests.trees
+    ('calibrated', (0.0, 0.49), 3)
     """
     path = default.default_path() if path is None else Path(path)
     with open_h5(path, KIND, SCHEMA, sealed=True) as file:

@@ -309,7 +309,6 @@ def test_what_is_no_journal_is_left_alone(begun, content):
     ("plan", "message"),
     [
         (plan_of(objective="hybrid"), f"objective {DEFAULT_OBJECTIVE} where hybrid is asked for"),
-        (plan_of(poisson=0.3), "Poisson's ratio 0.25 where 0.3"),
         (plan_of(SAMPLES + 1), "samples up to 3000 where 3001"),
         (plan_of(high=9), "moduli up to 10.0 where 9.0"),
         (plan_of(distribution="log-uniform"), "distribution uniform where log-uniform"),
@@ -321,6 +320,15 @@ def test_a_journal_of_other_settings_is_refused_and_kept(begun, plan, message):
     with pytest.raises(UserError, match=message):
         make(begun, plan)
     assert journal_of(begun).read_bytes() == before
+
+
+def test_a_journal_of_another_poissons_ratio_is_refused(tmp_path):
+    path = tmp_path / "shard.h5"
+    plan, other = (plan_of(objective="hybrid", poisson=poisson) for poisson in (0.25, 0.3))
+    with pytest.raises(KeyboardInterrupt):
+        make(path, plan, stopping_after(1))
+    with pytest.raises(UserError, match="Poisson's ratio 0.25 where 0.3"):
+        make(path, other)
 
 
 def test_fits_of_other_code_are_not_mixed(begun, monkeypatch):

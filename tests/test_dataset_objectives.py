@@ -6,16 +6,23 @@ from concurrent.futures import ThreadPoolExecutor
 import numba
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from carillon.errors import UserError
 from carillon.fem.block import cell_stiffness, prolongation, symmetries
-from carillon.fem.element import CORNERS, quadrature_stiffness, rigid_motions
-from dataset_gen.objectives import OBJECTIVES, energy, fit, sampled_energy
+from carillon.fem.element import (
+    CORNERS,
+    DEFAULT_POISSON,
+    quadrature_stiffness,
+    rigid_motions,
+)
+from dataset_gen.objectives import OBJECTIVES, energy, fit, oversampled, ratios_of, sampled_energy
 from dataset_gen.objectives.bounded import minimise_above
 from dataset_gen.objectives.coarse_response import coarse_of
 from dataset_gen.objectives.patterns import corner_strains, pattern_of, straining_motions
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR, reference_moduli
 from dataset_gen.sampling import pattern_classes, samples
+from dataset_gen.settings import ShardOptions, settings_of
 from tests import dataset_reference as reference
 
 EVERY = pytest.mark.parametrize("objective", OBJECTIVES)
@@ -277,3 +284,41 @@ def test_unknown_objective_and_poisson_are_refused():
         fit("best", np.ones((1, 8)))
     with pytest.raises(UserError, match="outside"):
         fit("hybrid", np.ones((1, 8)), poisson=0.5)
+
+
+def test_calibrated_moduli_are_the_same_for_all_ratios_they_are_for():
+    young = samples(3, 0, 200)
+    expected = fit("calibrated", young, DEFAULT_POISSON)
+    for poisson in ratios_of("calibrated", DEFAULT_POISSON):
+        for found, same in zip(fit("calibrated", young, poisson), expected):
+            np.testing.assert_array_equal(found, same)
+    assert not np.allclose(fit("hybrid", young, 0.45).moduli, fit("hybrid", young, 0.25).moduli)
+
+
+def test_what_a_fit_at_a_high_ratio_makes_up_for_is_bending():
+    """Why `calibrated` has one ratio: stretching and shear would be right with the modulus 1."""
+    poisson, filled = 0.45, 255
+    stiffness, loads = (parts.sum(axis=0) for parts in oversampled.octants(poisson))
+    fields = np.linalg.solve(stiffness, loads)
+    block = fields.T @ cell_stiffness(poisson).sum(axis=0) @ fields
+    strains = corner_strains(poisson) @ pattern_of(filled, poisson).to_corners @ fields
+    energies = eigh(strains.T @ strains, block, eigvals_only=True)
+    np.testing.assert_allclose(energies[:12], 1.0, atol=0.01)
+    np.testing.assert_allclose(energies[12:], np.repeat([1.52, 2.19], 3), atol=0.01)
+    found = fit("oversampled", np.ones((1, 8)), poisson).moduli
+    np.testing.assert_allclose(found, 0.77, atol=0.01)
+
+
+@pytest.mark.parametrize("poisson", [-0.01, 0.495])
+def test_calibrated_refuses_ratios_it_is_not_for(poisson):
+    with pytest.raises(UserError, match=f"ratios 0 to 0.49, found {poisson}; choose another one"):
+        fit("calibrated", np.ones((1, 8)), poisson)
+    with pytest.raises(UserError, match="ratios 0 to 0.49"):
+        settings_of(ShardOptions(10, poisson=poisson))
+    assert fit("hybrid", np.ones((1, 8)), poisson).converged.all()
+
+
+def test_settings_of_calibrated_do_not_depend_on_the_ratio():
+    one, other = (settings_of(ShardOptions(10, poisson=poisson)) for poisson in (0.25, 0.33))
+    assert one == other and one.poisson == DEFAULT_POISSON
+    assert settings_of(ShardOptions(10, objective="hybrid", poisson=0.33)).poisson == 0.33

@@ -28,6 +28,11 @@ def test_they_are_small_and_trained_on_ten_million_rows_of_the_default_objective
     assert model.scores["depth"] <= 20 and model.forests.trees == 3
 
 
+def test_they_are_for_the_ratios_of_most_materials(model):
+    """From cork to rubber, up to where trilinear elements lock."""
+    assert model.ratios == (0.0, 0.49)
+
+
 @pytest.mark.parametrize("distribution", ["uniform", "log-uniform"])
 def test_they_reproduce_the_fit_on_fresh_blocks(model, distribution):
     """Measured 0.9997 and 0.998 for solid blocks, 0.9996 and 0.998 for the others."""

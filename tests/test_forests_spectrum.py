@@ -59,6 +59,19 @@ def test_forests_stay_near_the_direct_fit(cases, model, material, allowed):
     assert np.abs(learned / fitted - 1).max() < allowed
 
 
+@pytest.mark.parametrize("poisson", [0.1, 0.33, 0.45])
+@pytest.mark.parametrize(
+    ("material", "allowed"), [("uniform", 0.04), ("smooth", 0.04), ("notched", 0.05)]
+)
+def test_one_fit_serves_all_ratios(cases, material, poisson, allowed):
+    """Measured 0.7 to 2.9 %; a fit at the ratio 0.45 itself is 6 to 9 % too soft."""
+    field, _ = cases[material]
+    share = lumped_share(DEFAULT_OBJECTIVE)
+    exact = fine_frequencies(field, MODES, poisson)
+    found = coarse_frequencies(field, direct(DEFAULT_OBJECTIVE), MODES, poisson, share)
+    assert rms_error(found, exact)[0] < allowed
+
+
 def test_galerkin_bounds_the_frequencies_from_above(cases):
     """Galerkin coarsening with the consistent mass is a Ritz method on a subspace."""
     for field, exact in cases.values():

@@ -2,13 +2,14 @@
 
 import hashlib
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from carillon.errors import UserError
 from carillon.fem.geometry import blocks_from_mesh
-from forests import coarsen
+from forests import coarsen, load_model, save_model
 from forests import default as default_forests
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.forest import forest_or_reason, load_forest
@@ -59,13 +60,35 @@ def test_named_and_default_forests_coarsen_by_the_model_they_hold(forests, as_de
     assert build_problem(BOX).coarsening == {}
 
 
-def test_another_poisson_ratio_is_answered_with_what_to_train(forests, as_default):
-    with pytest.raises(UserError, match=r"forests\.h5: trained for Poisson's ratio 0\.25"):
-        build_problem(options(forest=str(forests), poisson=0.3))
+def test_forests_of_calibrated_give_the_same_moduli_for_all_ratios(forests, as_default):
+    expected = build_problem(options()).model.young
+    for poisson in (0.0, 0.33, 0.49):
+        for found in (options(poisson=poisson), options(forest=str(forests), poisson=poisson)):
+            assert np.array_equal(build_problem(found).model.young, expected)
+
+
+def test_a_ratio_that_forests_are_not_for_is_answered_with_what_to_train(forests, as_default):
+    with pytest.raises(
+        UserError, match=r"forests\.h5: trained for Poisson's ratios 0 to 0\.49, the"
+    ):
+        build_problem(options(forest=str(forests), poisson=-0.1))
     with pytest.raises(UserError) as caught:
-        build_problem(options(poisson=0.3))
-    for words in ("Poisson's ratio 0.25, the model has 0.3", "--poisson 0.3", "--forest"):
+        build_problem(options(poisson=0.495))
+    for words in ("ratios 0 to 0.49, the model has 0.495", "--poisson 0.495", "--forest"):
         assert words in str(caught.value)
+
+
+def test_forests_of_fits_at_one_ratio_refuse_others(forests, tmp_path):
+    """Those of other objectives, and of `calibrated` at another ratio by earlier versions."""
+    model = load_model(forests)
+    for changed in (replace(model, objective="hybrid"), replace(model, poisson=0.3)):
+        path = tmp_path / "one.h5"
+        save_model(path, changed)
+        assert changed.ratios == (changed.poisson, changed.poisson)
+        assert load_forest(path, changed.poisson).model.ratios == changed.ratios
+        sentence = rf"one\.h5: trained for Poisson's ratio {changed.poisson}, the model has 0\.4"
+        with pytest.raises(UserError, match=sentence):
+            load_forest(path, 0.4)
 
 
 def test_absent_default_forests_are_left_out_with_a_sentence(no_default, caplog):

@@ -83,7 +83,7 @@ def test_written_modes_are_those_of_the_written_model(designed, tmp_path):
     write_design(tmp_path / "design.h5", designed)
     read = read_design(tmp_path / "design.h5")
     truth = solve(read.model, modes=6 + len(read.frequencies), method="slepc")
-    np.testing.assert_allclose(truth.frequencies[6:], read.frequencies, rtol=1e-6)
+    np.testing.assert_allclose(truth.frequencies[6:], read.coarse_frequencies, rtol=1e-6)
 
 
 @pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
@@ -105,12 +105,14 @@ def test_density_gives_way_to_bounds_of_the_moduli(tmp_path, discretisation):
     np.testing.assert_allclose(heard[1].gains, np.sqrt(factor) * heard[0].gains)
 
 
-@pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
-def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation):
+@pytest.mark.parametrize(
+    ("discretisation", "coarsen"), [("voxel", "none"), ("voxel", "ddfem"), ("finite-cell", "none")]
+)
+def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation, coarsen):
     """Targets of a bar whose Poisson's ratio is another than that of the start."""
     made = small_project.project(tmp_path, evaluations=90)
     resolution = 16 if discretisation == "voxel" else 12
-    made = replace(made, discretisation=discretisation, resolution=resolution)
+    made = replace(made, discretisation=discretisation, coarsen=coarsen, resolution=resolution)
     targets = small_project.targets(replace(made, poisson=0.42))
     fixed = optimise(prepare(made, targets))
     free = replace(made, material=replace(made.material, poisson_bounds=[0.0, 0.45]))
@@ -124,6 +126,14 @@ def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation):
     other = prepare(narrow, targets)
     z = coordinates_of(other, designed)
     assert other.setting.material.poisson(z) == pytest.approx(designed.model.poisson)
+
+
+def test_free_ratios_that_forests_are_not_for_are_refused_before_the_search(tmp_path):
+    made = replace(small_project.project(tmp_path), coarsen="ddfem")
+    targets = small_project.targets(made)
+    free = replace(made, material=replace(made.material, poisson_bounds=[-0.2, 0.4]))
+    with pytest.raises(UserError, match="Poisson's ratios 0 to 0.49, the model has -0.2"):
+        prepare(free, targets)
 
 
 def test_bounds_narrower_than_the_moduli_have_their_middle():

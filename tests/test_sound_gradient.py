@@ -133,6 +133,16 @@ def test_gradient_by_poissons_ratio(coarsen, coordinate):
     np.testing.assert_allclose(evaluation.eigenvalues, exact(solid, z)[0], rtol=1e-8)
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_gradient_by_poissons_ratio_through_the_forests(law):
+    """Their moduli do not depend on it, the elements' stiffness does."""
+    solid = simulation((8, 6, 4), "ddfem", law, FreePoisson(0.0, 0.45, 0.25))
+    z = np.append(0.2 * np.random.default_rng(0).standard_normal(SIZE), 1.0)
+    frequency, by_frequency, evaluation = assert_gradients(solid, z, 1e-5)
+    assert abs(frequency[-1] / by_frequency[-1] - 1.0) < 1e-3
+    np.testing.assert_allclose(evaluation.eigenvalues, exact(solid, z)[0], rtol=1e-8)
+
+
 def test_poissons_ratio_stays_between_its_bounds_and_has_a_slope():
     free = FreePoisson(0.0, 0.45, 0.3)
     at = [free.at(each) for each in (-40.0, -1.0, 0.0, 1.0, 40.0)]

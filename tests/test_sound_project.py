@@ -194,7 +194,6 @@ RIM = LEAST["targets"][0]
         ({"material": {"young_bounds": [1e9]}}, "material.young_bounds: .*expected 2 of them"),
         ({"material": {"young_bounds": [2e9, 1e9]}}, "young_bounds: .*the lower one first"),
         ({"material": {"poisson_bounds": [0, 0.5]}}, "poisson_bounds.*found 0.5, expected at most"),
-        ({"material": {"poisson_bounds": [0, 0.4]}}, "coarsen ddfem, whose forests hold for one"),
         (
             {"coarsen": "none", "material": {"poisson_bounds": [0.3, 0.4]}},
             "expected poisson, which the search starts from, between them; it is 0.25",

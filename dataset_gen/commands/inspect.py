@@ -10,6 +10,7 @@ import numpy as np
 
 from carillon.arrays import Index
 from carillon.command_line.progress import say, track
+from dataset_gen.objectives import ratios_of
 from dataset_gen.objectives.quadratic import MODULUS_FLOOR
 from dataset_gen.shards import UNIT, Shard, iterate_shard
 from dataset_gen.speed import Speed
@@ -75,6 +76,7 @@ def describe(path: str | Path) -> dict[str, Any]:
         "path": str(path),
         "objective": settings.objective,
         "poisson": settings.poisson,
+        "poisson_range": list(ratios_of(settings.objective, settings.poisson)),
         "seed": settings.seed,
         "samples": [settings.start, settings.stop],
         "unit": UNIT,
@@ -98,12 +100,14 @@ def as_text(summary: dict[str, Any]) -> str:
     """The result of `describe` as lines."""
     first, past = summary["samples"]
     low, high = summary["range"]
+    least, largest = summary["poisson_range"]
     unit = summary["unit"]
     return "\n".join(
         [
             f"{summary['path']}: samples {first}..{past - 1} of seed {summary['seed']}, "
             f"{past - first:,} in all, checksums right",
-            f"objective {summary['objective']}, Poisson's ratio {summary['poisson']}",
+            f"objective {summary['objective']}, Poisson's ratio {summary['poisson']}"
+            + (f", for solids of {least:g} to {largest:g}" if least < largest else ""),
             f"moduli {summary['distribution']} in {low:g}..{high:g} {unit}: fine "
             f"{summary['smallest_modulus']:.4g}..{summary['largest_modulus']:.4g}, coarse "
             f"{summary['smallest_coarse_modulus']:.4g}..{summary['largest_coarse_modulus']:.4g}",

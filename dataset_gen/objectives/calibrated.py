@@ -10,6 +10,11 @@ The energies of a lone block cannot tell how its neighbours hold it, nor how muc
 coarse mesh is between its nodes; a spectrum can. A product of powers with exponents that sum to one
 stays homogeneous of degree one, and factors that are equal on octants which the pattern's
 symmetries exchange keep it equivariant.
+
+Blocks are fitted at one Poisson's ratio, that of the calibration, and the moduli serve solids of
+all ratios: the element's own matrices K_q follow the ratio. A fit at a higher one lowers a modulus
+as far as bending, which locks more in the coarse element than in the block, asks for, and with it
+the answer to stretching and shear, which was right.
 """
 
 import numpy as np
@@ -30,11 +35,9 @@ def contrast_logs(young: Array, held: Array, unit: Array, held_unit: Array) -> t
     return (np.log(held / held_unit), np.log(galerkin_moduli(young) / galerkin_moduli(unit)))
 
 
-def combine(
-    calibration: Calibration, young: Array, held: Array, mask: int, poisson: float
-) -> Array:
+def combine(calibration: Calibration, young: Array, held: Array, mask: int) -> Array:
     """Moduli (n, 8) of blocks with the moduli `held` of `oversampled`."""
-    filled = mask == ALL_FILLED
+    filled, poisson = mask == ALL_FILLED, calibration.poisson
     share = calibration.galerkin_filled if filled else calibration.galerkin_void
     ours, projected = contrast_logs(young, held, unit_block(mask), held_unit_moduli(mask, poisson))
     contrast = np.exp((1.0 - share) * ours + share * projected)
@@ -44,7 +47,8 @@ def combine(
 def fit_pattern(young: Array, mask: int, poisson: float) -> PatternFits:
     """Fit blocks (n, 8) that share the void pattern `mask`, the least of its class.
 
-    The residual is that of `oversampled`.
+    Moduli do not depend on `poisson`. The residual is that of `oversampled`.
     """
-    held = oversampled.fit_pattern(young, mask, poisson)
-    return held._replace(moduli=combine(default_calibration(), young, held.moduli, mask, poisson))
+    calibration = default_calibration()
+    held = oversampled.fit_pattern(young, mask, calibration.poisson)
+    return held._replace(moduli=combine(calibration, young, held.moduli, mask))

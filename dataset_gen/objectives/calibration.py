@@ -1,7 +1,7 @@
 """Constants of the objective `calibrated`, fitted once to spectra of random solids.
 
 They are few: per class of void patterns one factor for every set of octants that the pattern's
-symmetries exchange, two exponents, and one share of lumped mass.
+symmetries exchange, two exponents, one share of lumped mass, and Poisson's ratio of the fits.
 """
 
 import json
@@ -33,6 +33,10 @@ class Calibration:
     the answer of `oversampled`."""
     lumped_share: float
     """Share of row-sum lumped mass in coarse cells whose octants are all filled."""
+    poisson: float
+    """Poisson's ratio that blocks are fitted at, whatever that of the solid."""
+    ratios: tuple[float, float]
+    """Least and largest Poisson's ratio of the solids that these moduli are for."""
     provenance: dict[str, Any]
     """How the constants were found."""
 
@@ -46,12 +50,14 @@ def parse(content: Mapping[str, Any]) -> Calibration:
         factors = np.ones((256, 8))
         for mask, row in content["factors"].items():
             factors[int(mask)] = row
-        share = content["galerkin_share"]
+        share, poisson = content["galerkin_share"], content["poisson"]
         return Calibration(
             factors,
             float(share["filled"]),
             float(share["partly_void"]),
             float(content["lumped_share"]),
+            float(poisson["fitted"]),
+            (float(poisson["least"]), float(poisson["largest"])),
             dict(content.get("provenance", {})),
         )
     except (KeyError, TypeError, ValueError) as error:

@@ -64,7 +64,7 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     e : (n, 8)
         Fine moduli in bit order, any unit, 0 where a cell is void.
     poisson
-        Poisson's ratio of all cells.
+        Poisson's ratio of the solid, whose moduli by `calibrated` are the same for any.
 
     Notes
     -----
@@ -79,7 +79,7 @@ def fit(objective: str, e: ArrayLike, poisson: float = DEFAULT_POISSON) -> Fits:
     (True, (2, 8))
     """
     require_objective(objective)
-    require_poisson(poisson)
+    require_poisson(objective, poisson)
     young = np.ascontiguousarray(e, dtype=float)
     _require_blocks(young)
     images, turns = orientations()

@@ -31,6 +31,7 @@ def describe(path: str | Path) -> dict[str, Any]:
         "path": str(path),
         "objective": model.objective,
         "poisson": model.poisson,
+        "poisson_range": list(model.ratios),
         "transform": model.transform,
         "trees": model.forests.trees,
         "nodes": len(model.forests.nodes),
@@ -44,11 +45,16 @@ def describe(path: str | Path) -> dict[str, Any]:
 def as_text(summary: dict[str, Any]) -> str:
     """The result of `describe` as lines."""
     lines = [
-        f"{summary['path']}: forests of objective {summary['objective']}, "
-        f"Poisson's ratio {summary['poisson']}, {summary['transform']} features",
+        f"{summary['path']}: forests of objective {summary['objective']} at Poisson's ratio "
+        f"{summary['poisson']}, for {_ratios(summary)}, {summary['transform']} features",
         f"2 x {summary['trees']} trees, {summary['leaves']:,} leaves, "
         f"{summary['memory_bytes'] / 1e6:.1f} MB in memory",
     ]
     lines += [f"{name:<28}{value:.6g}" for name, value in summary["scores"].items()]
     lines.append(f"commit {summary['provenance'].get('commit', 'unknown')}")
     return "\n".join(lines)
+
+
+def _ratios(summary: dict[str, Any]) -> str:
+    least, largest = summary["poisson_range"]
+    return f"solids of {least:g} to {largest:g}" if least < largest else "solids of that one"

@@ -46,7 +46,10 @@ class SampleOptions:
     objective: Annotated[str, OneOf(*DATASET_OBJECTIVES)] = option(
         DEFAULT_OBJECTIVE, "of their fits"
     )
-    poisson: PoissonRatio = option(DEFAULT_POISSON, "their Poisson's ratio")
+    poisson: PoissonRatio = option(
+        DEFAULT_POISSON,
+        "Poisson's ratio of the solids; calibrated serves 0 to 0.49 by one fit",
+    )
     distributions: tuple[str, ...] = option(
         ("uniform",),
         "distributions of their moduli, which share the samples: uniform or log-uniform (default "

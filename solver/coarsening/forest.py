@@ -14,6 +14,8 @@ FOREST = "ddfem"
 """Name of coarsening by forests."""
 DEFAULT = "default"
 """Name of the forests that come with the package."""
+ROUNDING = 1e-12
+"""Difference of Poisson's ratios that counts as none."""
 _DIGITS = 16
 
 
@@ -54,14 +56,15 @@ class ForestCoarsening(Coarsening):
 def load_forest(path: str | Path | None, poisson: float) -> ForestCoarsening:
     """Forests of the file `path`, or the default ones, for a solid of this Poisson's ratio.
 
-    Raises UserError if there are none, the file is not a model, or they are for another Poisson's
-    ratio.
+    Raises UserError if there are none, the file is not a model, or they are for other Poisson's
+    ratios.
     """
     source = DEFAULT if path is None else str(path)
     file = default_forests.default_path() if path is None else Path(path)
     model = forests.load_model(file)
-    if abs(model.poisson - poisson) > 1e-12:
-        raise UserError(_mismatch(path, model.poisson, poisson))
+    least, largest = model.ratios
+    if not least - ROUNDING <= poisson <= largest + ROUNDING:
+        raise UserError(_mismatch(path, least, largest, poisson))
     with open(file, "rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     return ForestCoarsening(source, model, digest[:_DIGITS])
@@ -79,14 +82,16 @@ def forest_or_reason(
         return None, f"without ddfem: {error}"
 
 
-def _mismatch(path: str | Path | None, trained: float, expected: float) -> str:
+def _mismatch(path: str | Path | None, least: float, largest: float, expected: float) -> str:
+    one = least == largest
+    trained = f"ratio {least:g}" if one else f"ratios {least:g} to {largest:g}"
     if path is None:
         return (
-            f"the default forests are for Poisson's ratio {trained:g}, the model has {expected:g}; "
-            f"train others (carillon generate --poisson {expected:g}, then carillon train) "
-            "and name them with --forest"
+            f"the default forests are for Poisson's {trained}, the model has {expected:g}; "
+            f"train others (carillon generate --objective hybrid --poisson {expected:g}, then "
+            "carillon train) and name them with --forest"
         )
     return (
-        f"{path}: trained for Poisson's ratio {trained:g}, the model has {expected:g}; train "
+        f"{path}: trained for Poisson's {trained}, the model has {expected:g}; train "
         "forests for it or pass --poisson"
     )

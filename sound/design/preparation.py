@@ -72,13 +72,16 @@ def prepared_solid(
 ) -> PreparedSolid:
     """Voxels and reduced material of a solid whose `surface` is struck.
 
-    Raises UserError for anything wrong with the mesh or the numbers.
+    Raises UserError for anything wrong with the mesh or the numbers, or forests that are not for
+    all Poisson's ratios that are free.
     """
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
     loaded = SolidSurface.read(solid.mesh, solid.unit)
     mesh, cells = discretised(loaded, solid)
     loaded.doubt_unit()
     bounds = material.poisson_bounds
+    for ratio in bounds or ():
+        replace(solid, poisson=ratio).coarsening()  # which refuses ratios that it is not for
     free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
     reduced = ReducedMaterial.of_mesh(
         mesh, material.dimensions, material.young, material.law, free_poisson

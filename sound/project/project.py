@@ -84,12 +84,6 @@ class Project:
         object.__setattr__(self, "coarsen", self.solid.coarsen)
         bounds = self.material.poisson_bounds
         place = ("material", "poisson_bounds")
-        if bounds is not None and self.coarsen == FOREST:
-            raise ParameterError(
-                place,
-                "found coarsen ddfem, whose forests hold for one Poisson's ratio; choose coarsen "
-                "none or average, or discretisation finite-cell",
-            )
         if bounds is not None and not bounds[0] < self.poisson < bounds[1]:
             raise ParameterError(
                 place,

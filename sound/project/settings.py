@@ -86,7 +86,8 @@ class MaterialSettings:
     ) = option(
         None,
         "lowest and highest Poisson's ratio of the whole, which is then sought, too, from the one "
-        "of poisson on; not with forests, which hold for one. It is kept if null [1]",
+        "of poisson on; forests must be for all between, as those of the package are from 0 on. "
+        "It is kept if null [1]",
     )
 
 

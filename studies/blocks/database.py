@@ -125,7 +125,7 @@ def build(
     start = time.perf_counter()
     base = np.array(materials, dtype=float)
     _require_materials(base)
-    require_poisson(poisson)
+    require_poisson(OBJECTIVE, poisson)
     keys = combination_keys(len(base))
     if base[0] == 0.0:
         keys = keys[1:]  # void in all cells

@@ -136,7 +136,7 @@ def test_every_way_is_rated_against_both_truths(plate):
         (["--modes", "6"], "found 6, expected at least 7"),
         (["--runs", "0"], "found 0, expected at least 1"),
         (["--lumped"], "unrecognized arguments: --lumped"),
-        (["--poisson", "0.3"], "the default forests are for Poisson's ratio 0.25"),
+        (["--poisson", "-0.3"], "the default forests are for Poisson's ratios 0 to 0.49"),
         (["--out", "absent/case.json"], "the folder absent does not exist"),
     ],
 )
