@@ -8,4 +8,9 @@ COMMANDS = {
         "errors of a coarse model's single modes, true and expected, and what they are due to",
         room="solver",
     ),
+    "ratios": Command(
+        "studies.coarsening.ratios_command",
+        "errors of coarse models by Poisson's ratio: forests, fits at each ratio, Galerkin",
+        room="solver",
+    ),
 }
