@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -406,7 +406,7 @@ def coarsen(
 
     fine = _solid(body, material, resolution, "voxel")
     file = forests.path if isinstance(forests, Forests) else forests
-    coarsening = make_coarsening(method, cast(float, fine.poisson), file)
+    coarsening = make_coarsening(method, fine.regions.ratios, file)
     young = fine.young[:, 0] if fine.young.ndim > 1 else fine.young
     region = fine.cell_regions if isinstance(fine, ElasticModel) else None
     constants: Constants = {"regions": fine.regions, "supports": fine.supports}

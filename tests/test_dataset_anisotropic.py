@@ -7,6 +7,7 @@ import pytest
 
 from carillon.errors import UserError
 from carillon.fem.block import ALL_FILLED, CELL_NODES, NODES, degrees_of_freedom, symmetries
+from carillon.fem.elasticity import DEFAULT_POISSON
 from carillon.fem.element import CORNERS, elasticity_matrix, shape_functions
 from dataset_gen.objectives import fit, general_cells, inertial
 from dataset_gen.objectives.anisotropic import GENERAL_OBJECTIVES, fit_blocks
@@ -64,6 +65,9 @@ def test_isotropic_cells_of_one_ratio_have_the_moduli_of_the_isotropic_fit(objec
     patterns = (np.arange(1, 256)[:, None] >> np.arange(8) & 1).astype(float)
     young = np.concatenate([samples(seed=5, start=0, stop=100), patterns])
     expected = fit(objective, young, poisson)
+    if objective == "calibrated":
+        # Its moduli are those of fits at one ratio.
+        poisson = DEFAULT_POISSON
     found = fit_blocks(young[..., None, None] * elasticity_matrix(poisson), young > 0, objective)
     own = np.where(young > 0, young, filled_mean(young, young > 0)[:, None])
     np.testing.assert_allclose(found.scales * own, expected.moduli, rtol=TOLERANCE)

@@ -70,7 +70,7 @@ def exact(simulation, z):
     difference over a step of 1e-6 that would be 3e-3.
     """
     model = simulation.elements.with_young(simulation.material.moduli(z))
-    model = model.with_constants(simulation.poisson(z), model.density)
+    model = model.with_regions(model.regions.with_poisson(simulation.poisson(z)))
     K, M = assembled(model)
     shift = -1e-2 * model.young.max() / (model.density * EDGE**2)
     start = np.random.default_rng(0).standard_normal(K.shape[0])

@@ -123,6 +123,11 @@ class Regions:
         """Mean over the regions; of anisotropic materials that of all directions."""
         return float(np.mean([law.isotropic_equivalent()[1] for law in self.laws]))
 
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """Poisson's ratios of the isotropic ones, ascending."""
+        return tuple(sorted({law.poisson for law in self.laws if law.poisson is not None}))
+
     @cached_property
     def poissons(self) -> Array:
         """(r,) Poisson's ratios; NaN of anisotropic materials."""

@@ -217,7 +217,7 @@ def _undivided(problem: Problem | None) -> DividedCells:
 def _coarse(solid: ProblemOptions, problem: Problem | None, start: str | None) -> RefinedModel:
     """The coarse model to begin with, with those blocks fine that are in the file `start`."""
     assert problem is not None
-    coarsening = solid.coarsening()
+    coarsening = solid.coarsening(problem.regions)
     assert coarsening is not None
     mesh = None if start is None else read_modes(start, with_modes=False).mesh
     return RefinedModel(_fine(problem), coarsening, mesh)

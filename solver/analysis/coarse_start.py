@@ -57,7 +57,9 @@ def _coarsened(model: Solid | None, coarsening: Coarsening | None) -> tuple[Bloc
             "--refine starts from the coarsened solid; expected voxels that are not coarsened"
         )
     blocks = blocks_from_mesh(model.mesh)
-    moduli = element_moduli(blocks, model.young[:, 0], coarsening)
+    moduli = element_moduli(
+        blocks, model.young[:, 0], coarsening, model.regions, model.cell_regions
+    )
     coarse = coarse_model(
         blocks,
         moduli,

@@ -101,12 +101,14 @@ class ProblemOptions:
         """Plain dictionary, for provenance."""
         return asdict(self)
 
-    def coarsening(self) -> Coarsening | None:
+    def coarsening(self, regions: Regions | None = None) -> Coarsening | None:
         """The coarsening of the blocks; None if the fine mesh itself is to be analysed.
 
-        Raises UserError, see `solver.coarsening.choice.make_coarsening`.
+        The `regions` of the solid have Poisson's ratios of their own. Raises UserError, see
+        `solver.coarsening.choice.make_coarsening`.
         """
-        return make_coarsening(self.coarsen, self.poisson, self.forest, self.objective)
+        ratios = (self.poisson,) if regions is None else regions.ratios
+        return make_coarsening(self.coarsen, ratios, self.forest, self.objective)
 
 
 @dataclass(frozen=True)
@@ -194,7 +196,7 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
         placing = placed.regions, placed.region, placed.shared
         cells = finite_cell_model(covering.cells, young, *placing)
         return whole(_held(cells, composed, surface), seconds, covering=covering)
-    coarsening = options.coarsening()
+    coarsening = options.coarsening(placed.regions)
     fine = fine_model(mesh, young, placed.region, regions=placed.regions, lumped=options.lumped)
     fine = _held(fine, composed, surface)
     if coarsening is None:

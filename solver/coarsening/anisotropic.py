@@ -4,10 +4,15 @@ import numpy as np
 
 from carillon.arrays import Array, Index
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, lumped_share
-from dataset_gen.objectives.anisotropic import fit_blocks
+from dataset_gen.objectives.anisotropic import GENERAL_OBJECTIVES, fit_blocks
 
 CHUNK = 4096
 """Blocks fitted at a time; each takes about 15 kB."""
+
+
+def general_objective(objective: str) -> str:
+    """Objective by which general cells are fitted where isotropic ones are by `objective`."""
+    return objective if objective in GENERAL_OBJECTIVES else DEFAULT_OBJECTIVE
 
 
 def octant_laws(young: Array, law: Index) -> Index:

@@ -1,5 +1,6 @@
 """The coarsening that a name and its options stand for."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from carillon.fem.element import DEFAULT_POISSON
 from dataset_gen import objectives
 from dataset_gen.objectives import DEFAULT_OBJECTIVE
 from forests.baselines import average, galerkin
+from solver.coarsening.anisotropic import general_objective
 from solver.coarsening.coarsening import Coarsening
 from solver.coarsening.forest import FOREST, load_forest
 
@@ -22,7 +24,7 @@ METHODS = ("none", *LINEAR, FOREST, FIT)
 
 def make_coarsening(
     method: str,
-    poisson: float = DEFAULT_POISSON,
+    poisson: float | Sequence[float] = DEFAULT_POISSON,
     forest: str | Path | None = None,
     objective: str = DEFAULT_OBJECTIVE,
 ) -> Coarsening | None:
@@ -35,10 +37,12 @@ def make_coarsening(
         return None
     if method in LINEAR:
         return LinearCoarsening(method)
+    ratios = (poisson,) if isinstance(poisson, float | int) else tuple(poisson)
     if method == FOREST:
-        return load_forest(forest, poisson)
+        return load_forest(forest, *ratios)
     if method == FIT:
-        return FitCoarsening(objective, poisson)
+        mean = sum(ratios) / len(ratios) if ratios else DEFAULT_POISSON
+        return FitCoarsening(objective, mean)
     raise UserError(f"coarsening {method!r} is unknown, expected one of {', '.join(METHODS)}")
 
 
@@ -63,7 +67,7 @@ class FitCoarsening(Coarsening):
     """Minimisers of an objective, which have no derivatives here."""
 
     def __init__(self, objective: str, poisson: float) -> None:
-        super().__init__(FIT, objectives.lumped_share(objective))
+        super().__init__(FIT, objectives.lumped_share(objective), general_objective(objective))
         self.objective = objective
         self.poisson = poisson
 

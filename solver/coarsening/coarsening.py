@@ -15,11 +15,15 @@ class Coarsening(ABC):
         What it is called on a command line.
     lumped_fraction
         Fraction of lumped mass in elements without void octants, see `ElasticModel`.
+    general
+        Objective by which blocks with anisotropic cells are fitted; None if their moduli follow
+        from those of the cells as others' do.
     """
 
-    def __init__(self, name: str, lumped_fraction: float = 0.0) -> None:
+    def __init__(self, name: str, lumped_fraction: float = 0.0, general: str | None = None) -> None:
         self.name = name
         self.lumped_fraction = lumped_fraction
+        self.general = general
 
     @abstractmethod
     def moduli(self, e: Array) -> Array:

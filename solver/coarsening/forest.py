@@ -8,6 +8,7 @@ from carillon.arrays import Array
 from carillon.errors import UserError
 from dataset_gen.objectives import lumped_share
 from forests import default as default_forests
+from solver.coarsening.anisotropic import general_objective
 from solver.coarsening.coarsening import Coarsening
 
 FOREST = "ddfem"
@@ -31,7 +32,7 @@ class ForestCoarsening(Coarsening):
     """
 
     def __init__(self, source: str, model: forests.Model, sha256: str) -> None:
-        super().__init__(FOREST, lumped_share(model.objective))
+        super().__init__(FOREST, lumped_share(model.objective), general_objective(model.objective))
         self.source = source
         self.model = model
         self.sha256 = sha256
@@ -53,8 +54,8 @@ class ForestCoarsening(Coarsening):
         }
 
 
-def load_forest(path: str | Path | None, poisson: float) -> ForestCoarsening:
-    """Forests of the file `path`, or the default ones, for a solid of this Poisson's ratio.
+def load_forest(path: str | Path | None, *ratios: float) -> ForestCoarsening:
+    """Forests of the file `path`, or the default ones, for a solid of these Poisson's ratios.
 
     Raises UserError if there are none, the file is not a model, or they are for other Poisson's
     ratios.
@@ -63,19 +64,20 @@ def load_forest(path: str | Path | None, poisson: float) -> ForestCoarsening:
     file = default_forests.default_path() if path is None else Path(path)
     model = forests.load_model(file)
     least, largest = model.ratios
-    if not least - ROUNDING <= poisson <= largest + ROUNDING:
-        raise UserError(_mismatch(path, least, largest, poisson))
+    for poisson in ratios:
+        if not least - ROUNDING <= poisson <= largest + ROUNDING:
+            raise UserError(_mismatch(path, least, largest, poisson))
     with open(file, "rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     return ForestCoarsening(source, model, digest[:_DIGITS])
 
 
 def forest_or_reason(
-    path: str | Path | None, poisson: float
+    path: str | Path | None, *ratios: float
 ) -> tuple[ForestCoarsening | None, str]:
     """The same, or None and why there are no default forests for this solid, which is no error."""
     try:
-        return load_forest(path, poisson), ""
+        return load_forest(path, *ratios), ""
     except UserError as error:
         if path is not None:
             raise

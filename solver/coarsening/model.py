@@ -7,10 +7,12 @@ import numpy as np
 from carillon.arrays import Array, Flags
 from carillon.errors import UserError
 from carillon.fem.block import ALL_FILLED
+from carillon.fem.elasticity import elasticity_matrix
 from carillon.fem.geometry import Blocks, HexMesh, blocks_from_mesh
 from carillon.fem.model import Constants, ElasticModel, fine_model
 from carillon.fem.moduli import at_points, require_moduli
-from carillon.fem.regions import RegionOf
+from carillon.fem.regions import RegionOf, Regions
+from solver.coarsening.anisotropic import AnisotropicCoarsening
 from solver.coarsening.coarsening import Coarsening
 
 
@@ -19,16 +21,46 @@ def block_moduli(blocks: Blocks, young: Array) -> Array:
     return np.where(blocks.mask, young[blocks.fine_of_block], 0.0)
 
 
-def element_moduli(blocks: Blocks, young: Array, coarsening: Coarsening) -> Array:
-    """Moduli (mc, 8) [Pa] of the elements from `young` (m,) [Pa]: coarsened, or fine cells' own."""
+def element_moduli(
+    blocks: Blocks,
+    young: Array,
+    coarsening: Coarsening,
+    regions: Regions | None = None,
+    region: RegionOf | None = None,
+) -> Array:
+    """Moduli (mc, 8) [Pa] of the elements from `young` (m,) [Pa]: coarsened, or fine cells' own.
+
+    Blocks that hold an anisotropic material, of the `region` (m,) of a cell, are fitted one by one.
+    """
     e = block_moduli(blocks, young)
+    law = block_regions(blocks, region)
     whole = ~blocks.is_fine
     if whole.all():
-        return coarsening.moduli(e)
+        return _coarsened(e, law, coarsening, regions)
     # A fine cell is the only one of its element.
     moduli = at_points(e.sum(axis=1))
     if whole.any():
-        moduli[whole] = coarsening.moduli(e[whole])
+        few = None if law is None else law[whole]
+        moduli[whole] = _coarsened(e[whole], few, coarsening, regions)
+    return moduli
+
+
+def _coarsened(
+    e: Array, law: RegionOf | None, coarsening: Coarsening, regions: Regions | None
+) -> Array:
+    if regions is None or regions.is_isotropic or coarsening.general is None:
+        return coarsening.moduli(e)
+    law = np.zeros(e.shape, dtype=np.uint16) if law is None else law
+    anisotropic = np.isnan(regions.poissons)
+    chosen = (anisotropic[law] & (e > 0.0)).any(axis=1)
+    moduli = np.empty_like(e)
+    if not chosen.all():
+        moduli[~chosen] = coarsening.moduli(e[~chosen])
+    if chosen.any():
+        # Fits of isotropic cells are those at one ratio, see `dataset_gen.objectives.calibrated`.
+        matrices = np.where(anisotropic[:, None, None], regions.elasticity, elasticity_matrix())
+        general = AnisotropicCoarsening(coarsening.general)
+        moduli[chosen] = general.moduli(e[chosen], law[chosen].astype(np.int64), matrices)
     return moduli
 
 
@@ -84,7 +116,7 @@ def build_model(
     if given.ndim > 1:
         raise UserError(f"moduli: an array of shape {given.shape}, expected ({mesh.n_cells},)")
     blocks = blocks_from_mesh(mesh, refined)
-    moduli = element_moduli(blocks, given, coarsening)
+    moduli = element_moduli(blocks, given, coarsening, constants.get("regions"), region)
     return coarse_model(blocks, moduli, coarsening.lumped_fraction, region, **constants)
 
 

@@ -180,10 +180,13 @@ class _CoarseStart:
         return self._asked or (large and solver.options.method == "lobpcg")
 
     def __call__(self, solver: ModalSolver, model: Solid | None) -> Initial:
-        return coarse_start(solver, model, compute_on_root(self._comm, self._coarsening))
+        return coarse_start(
+            solver, model, compute_on_root(self._comm, lambda: self._coarsening(model))
+        )
 
-    def _coarsening(self) -> Coarsening:
-        forest, _ = forest_or_reason(self._solid.forest, self._solid.poisson)
+    def _coarsening(self, model: Solid | None) -> Coarsening:
+        assert model is not None
+        forest, _ = forest_or_reason(self._solid.forest, *model.regions.ratios)
         coarsening = forest or make_coarsening("galerkin")
         assert coarsening is not None
         return coarsening

@@ -49,7 +49,10 @@ class RefinedModel:
     @property
     def model(self) -> ElasticModel:
         """The model as it is now."""
-        moduli = element_moduli(self.blocks, self.young, self._coarsening)
+        fine = self.fine
+        moduli = element_moduli(
+            self.blocks, self.young, self._coarsening, fine.regions, fine.cell_regions
+        )
         return coarse_model(
             self.blocks,
             moduli,
