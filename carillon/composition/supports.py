@@ -13,9 +13,9 @@ from carillon.errors import UserError
 from carillon.fem.model import Solid
 from carillon.fem.supports import Supports
 
-HELD = 1e6
+HELD = 1e5
 """Stiffness of the spring at a held point, in multiples of modulus times lattice spacing. What is
-held moves by a millionth of what one spacing of the solid is strained."""
+held moves by a hundred thousandth of what one spacing of the solid is strained."""
 SAMPLE = 0.5
 """Largest edge of the triangles whose middles stand for a surface, in lattice spacings."""
 SLIGHT = 1e-6
