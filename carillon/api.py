@@ -277,27 +277,14 @@ class Solution:
             )
 
     def to_vtu(self, path: str | Path) -> None:
-        """Write mesh, moduli and modes for ParaView; finite cells as cubes with eight nodes.
+        """Write mesh, moduli and modes for ParaView; of finite cells the octants with material.
 
         Raises UserError if it cannot be written.
         """
-        import meshio
+        from solver.exchange.modes_vtu import Spectrum, write_all_modes
 
-        from carillon.files.atomic import atomic_path
-
-        if self.solid is None or self.shapes is None:
-            return
-        mesh = self.solid.hexmesh
-        corners = mesh.cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
-        fields = {
-            f"mode {number}, {hertz:.4g} Hz": np.ascontiguousarray(shape)
-            for number, (hertz, shape) in enumerate(zip(self.frequencies, self.shapes), 1)
-        }
-        young = self.solid.young.reshape(len(self.solid.young), -1).mean(axis=1)
-        cells = {"Young's modulus [Pa]": [young]} if len(young) == len(corners) else {}
-        grid = meshio.Mesh(mesh.nodes, [("hexahedron", corners)], fields, cells)
-        with atomic_path(path) as temporary:
-            grid.write(temporary, file_format="vtu")
+        if self.solid is not None:
+            write_all_modes(path, Spectrum.of_contents(self._file()))
 
     def _file(self) -> ModesFile:
         from solver.files.modes_file import ModesFile

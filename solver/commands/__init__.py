@@ -11,5 +11,6 @@ COMMANDS = {
         "solver.commands.audit",
         "residuals, orthogonality and inertia count anew, from modes files alone",
     ),
+    "vtu": Command("solver.commands.vtu", "modes for ParaView, PyVista and meshio"),
     "respond": Command("solver.commands.respond", "motion and sound of a strike (Fig. 12, 13)"),
 }
