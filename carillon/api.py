@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.figure import Figure
     from mpi4py import MPI
+    from scipy.sparse import csr_matrix
 
     from forests.model import Model
     from solver.files.modes_file import ModesFile
@@ -281,10 +282,10 @@ class Solution:
 
         Raises UserError if it cannot be written.
         """
-        from solver.exchange.modes_vtu import Spectrum, write_all_modes
+        from solver.exchange.modes_vtu import StreamedModes, write_all_modes
 
         if self.solid is not None:
-            write_all_modes(path, Spectrum.of_contents(self._file()))
+            write_all_modes(path, StreamedModes.of_contents(self._file()))
 
     def _file(self) -> ModesFile:
         from solver.files.modes_file import ModesFile
@@ -398,6 +399,28 @@ def coarsen(
     region = fine.cell_regions if isinstance(fine, ElasticModel) else None
     constants: Constants = {"regions": fine.regions, "supports": fine.supports}
     return build_model(fine.mesh, young, coarsening, region=region, **constants)
+
+
+def matrices(
+    body: Body, material: Given = None, resolution: int = 32, discretisation: str = "voxel"
+) -> tuple[csr_matrix, csr_matrix]:
+    """Stiffness [N/m] and mass [kg] of a solid, (3 n, 3 n), for solvers of your own.
+
+    Row 3 i + a is the displacement of node i of the solid's `mesh.nodes` along axis a, so that an
+    eigenvector reshaped to (n, 3) is a shape. The six least eigenvalues [rad^2/s^2] are zero.
+    Raises UserError for anything wrong with the solid. Parameters: see `solve`.
+
+    Examples
+    --------
+    >>> solution = ca.solve("builtin:box", resolution=4, modes=8)
+    >>> K, M = ca.matrices(solution.solid)
+    >>> shape = solution.shapes[6].ravel()
+    >>> bool(np.isclose(shape @ K @ shape, solution.eigenvalues[6])), round(shape @ M @ shape, 9)
+    (True, 1.0)
+    """
+    from solver.exchange.matrices import matrices as assembled
+
+    return assembled(_solid(body, material, resolution, discretisation))
 
 
 def read(path: str | Path) -> Solution | Design:

@@ -63,6 +63,7 @@ ARROWS = {
     "solver.subspace": "solver.assembly solver.distribution",
     "solver.linear": "solver.assembly solver.distribution",
     "solver.response": "solver.files solver.subspace",
+    "solver.exchange": "solver.assembly solver.files",
     "solver.reference": "solver.assembly solver.linear solver.subspace",
     "solver.correction": "solver.assembly solver.distribution solver.linear solver.subspace",
     "solver.hcms": "solver.assembly solver.distribution solver.linear solver.subspace",
@@ -76,8 +77,8 @@ ARROWS = {
         solver.distribution solver.files solver.linear solver.subspace""",
     "solver.accuracy": "solver.analysis solver.distribution solver.files solver.refinement",
     "solver.commands": """solver.accuracy solver.analysis solver.coarsening solver.correction
-        solver.distribution solver.files solver.linear solver.refinement solver.response
-        solver.verification""",
+        solver.distribution solver.exchange solver.files solver.linear solver.refinement
+        solver.response solver.verification""",
     #
     "sound": "solver.response",
     "sound.synthesis": "solver.response",

@@ -50,7 +50,7 @@ class Vectors:
 
 
 @dataclass(frozen=True)
-class Grid:
+class UnstructuredGrid:
     """Cells of one kind, and what is known of them."""
 
     points: Array
@@ -65,7 +65,7 @@ class Grid:
     """(n,) of each array that belongs to the whole."""
 
 
-def write_vtu(path: str | Path, grid: Grid, vectors: Vectors | None = None) -> None:
+def write_vtu(path: str | Path, grid: UnstructuredGrid, vectors: Vectors | None = None) -> None:
     """Write a grid, and vectors at its points.
 
     Raises UserError if the file cannot be written.
@@ -75,7 +75,7 @@ def write_vtu(path: str | Path, grid: Grid, vectors: Vectors | None = None) -> N
     >>> from tempfile import TemporaryDirectory
     >>> import meshio
     >>> cube = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
-    >>> grid = Grid(cube, np.array([HEXAHEDRON_CORNERS]))
+    >>> grid = UnstructuredGrid(cube, np.array([HEXAHEDRON_CORNERS]))
     >>> with TemporaryDirectory() as folder:
     ...     write_vtu(f"{folder}/cube.vtu", grid, Vectors(["outward"], [cube - 0.5]))
     ...     meshio.read(f"{folder}/cube.vtu").point_data["outward"][7].tolist()
@@ -117,7 +117,7 @@ class _Writer:
         return f'{begin} NumberOfTuples="{shape[0]}" format="appended" offset="{offset}"/>\n'
 
 
-def _head(writer: _Writer, grid: Grid, names: Sequence[str]) -> str:
+def _head(writer: _Writer, grid: UnstructuredGrid, names: Sequence[str]) -> str:
     count, corners = grid.cells.shape
     points = np.asarray(grid.points, dtype=float)
     small = len(points) < 2**31 and grid.cells.size < 2**31

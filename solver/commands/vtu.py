@@ -15,7 +15,7 @@ from solver.exchange.modes_vtu import (
     PVD,
     VTU,
     MotionOptions,
-    Spectrum,
+    StreamedModes,
     write_all_modes,
     write_motion,
 )
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> None:
             f"{' without --mode' if motion.mode is None else ' a list of files'}"
         )
     require_writable(arguments.out, [arguments.file])
-    spectrum = Spectrum.of_file(arguments.file)
+    spectrum = StreamedModes.of_file(arguments.file)
     hertz = spectrum.frequencies
     if motion.mode is None:
         write_all_modes(arguments.out, spectrum)

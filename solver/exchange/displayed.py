@@ -11,12 +11,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from carillon.fem.block import CELL_NODES, CORNER_NODES
-from carillon.fem.finite_cells import hanging as finite_cell_nodes
+from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.hanging import node_weights
-from carillon.fem.model import ElasticModel, Solid
+from carillon.fem.model import Solid
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,82 +40,61 @@ class Displayed:
 
 
 def displayed(model: Solid) -> Displayed:
-    """The cubes of a solid.
+    """The cubes of a solid; points come in the order of the nodes, those that hang after them.
 
     Elements are one cube each, void octants of coarse ones with them. Of finite cells the octants
-    that hold material are shown, at whose corners all their nodes are; a divided cell that lies in
-    one voxel is one cube.
+    that hold material are shown: all nodes are at their corners. A divided cell, which lies in one
+    voxel, is one cube, whose corners never hang.
     """
-    if isinstance(model, FiniteCellModel):
-        return _finite_cells(model)
-    assert isinstance(model, ElasticModel)
     mesh = model.mesh
-    share = model.filled.mean(axis=1)
-    young = model.young.mean(axis=1)
-    if mesh.kinds is None:
-        return Displayed(mesh.cells, None, mesh.nodes, young, model.density * share)
-    weights = node_weights()[mesh.kinds]
-    hangs = (mesh.hanging[:, None] >> np.arange(8) & 1).astype(bool)  # type: ignore[index]
-    cells, matrix = _with_hanging(mesh.cells, hangs, mesh.cells, weights, mesh)
-    return Displayed(cells, matrix, matrix @ mesh.nodes, young, model.density * share)
+    young = model.young.reshape(mesh.n_cells, -1).mean(axis=1)
+    if isinstance(model, FiniteCellModel):
+        share = _shares(model.cells)
+    else:
+        share = model.filled.mean(axis=1)
+        if mesh.kinds is not None and mesh.hanging is not None:
+            cells, matrix = _with_hanging(mesh.cells, mesh.hanging, node_weights()[mesh.kinds])
+            return Displayed(cells, matrix, matrix @ mesh.nodes, young, model.density * share)
+    return Displayed(mesh.cells, None, mesh.nodes, young, model.density * share)
 
 
-def _finite_cells(model: FiniteCellModel) -> Displayed:
-    cells, mesh = model.cells, model.mesh
+def _shares(cells: FiniteCells) -> Array:
+    """Share (m,) of each voxel's volume that is inside; one may be a whole divided cell."""
     owner, octant = np.nonzero(cells.voxels >= 0)
-    voxel, first = np.unique(cells.voxels[owner, octant], return_index=True)
-    octants = np.bincount(cells.voxels[owner, octant], cells.fractions[owner, octant])
-    if cells.kinds is None:
-        return Displayed(mesh.cells, None, mesh.nodes, model.young, model.density * octants)
-    owner, octant = owner[first], octant[first]
-    whole = cells.span[owner] == 4
-    density = model.density * octants / np.where(whole, 1.0, 8.0)
-    slots = np.where(whole[:, None], CELL_NODES[octant], CORNER_NODES)
-    kinds = cells.kinds[owner]
-    hangs = (kinds[:, None] & finite_cell_nodes.BITS) > 0
-    hangs = np.take_along_axis(hangs, slots, axis=1)
-    corners = np.take_along_axis(cells.nodes[owner], slots, axis=1)
-    some = np.flatnonzero(hangs.any(axis=1))
-    weights = np.zeros((len(voxel), 8, 27))
-    weights[some] = np.take_along_axis(
-        finite_cell_nodes.node_weights(kinds[some]), slots[some][:, :, None], axis=1
-    )
-    cubes, matrix = _with_hanging(corners, hangs, cells.nodes[owner], weights, mesh)
-    return Displayed(cubes, matrix, matrix @ mesh.nodes, model.young, density)
+    voxel = cells.voxels[owner, octant]
+    inside = np.bincount(voxel, cells.fractions[owner, octant])
+    parts = np.ones(len(inside))
+    if cells.is_mixed:
+        parts[voxel[cells.span[owner] == 2]] = 8.0
+    return inside / parts
 
 
 def _with_hanging(
-    corners: NDArray[np.integer],
-    hangs: NDArray[np.bool_],
-    nodes: NDArray[np.integer],
-    weights: Array,
-    mesh: HexMesh,
+    nodes: NDArray[np.int32], hanging: NDArray[np.uint8], weights: Array
 ) -> tuple[Index, sp.csr_matrix]:
-    """Points (c, 8) of cubes, and the matrix from nodes to points; those that hang come last.
+    """Points (c, 8) of cubes, and the matrix from nodes to points.
 
-    `corners` (c, 8) are nodes, where they do not hang (c, 8); there the values are `weights`
-    (c, 8, k) of the elements' `nodes` (c, k).
+    `nodes` (c, 8) of elements are at the corners that do not hang, see `HexMesh`; `weights`
+    (c, 8, 8) are theirs in the values at the corners.
     """
-    cell, corner = np.nonzero(hangs)
-    rows = np.repeat(np.arange(len(cell)), nodes.shape[1])
+    cell, corner = np.nonzero(hanging[:, None] >> np.arange(8) & 1)
+    count = int(nodes.max()) + 1
+    rows = np.repeat(np.arange(len(cell)), 8)
     data = (weights[cell, corner].ravel(), (rows, nodes[cell].ravel()))
-    each = sp.csr_matrix(data, shape=(len(cell), mesh.n_nodes))
+    each = sp.csr_matrix(data, shape=(len(cell), count))
     each.eliminate_zeros()
     each.sort_indices()
-    # Points that say the same of the same nodes are one.
     first, number = _distinct_rows(each)
-    cells = corners.astype(np.int64)
-    cells[cell, corner] = mesh.n_nodes + number
-    return cells, sp.vstack([sp.identity(mesh.n_nodes), each[first]], format="csr")
+    cells = nodes.astype(np.int64)
+    cells[cell, corner] = count + number
+    return cells, sp.vstack([sp.identity(count), each[first]], format="csr")
 
 
 def _distinct_rows(matrix: sp.csr_matrix) -> tuple[Index, Index]:
-    """First of equal rows, and which of these each row is (rows,)."""
+    """First of the rows that are means of the same nodes, and which of these each row is."""
     longest = int(np.diff(matrix.indptr).max(initial=0))
-    place = np.arange(matrix.nnz) - np.repeat(matrix.indptr[:-1], np.diff(matrix.indptr))
     row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    table = np.full((matrix.shape[0], 2 * longest), -1.0)
-    table[row, place] = matrix.indices
-    table[row, longest + place] = np.round(matrix.data, 12)
+    table = np.full((matrix.shape[0], longest), -1)
+    table[row, np.arange(matrix.nnz) - matrix.indptr[row]] = matrix.indices
     _, first, number = np.unique(table, axis=0, return_index=True, return_inverse=True)
     return first, number.ravel()

@@ -15,7 +15,7 @@ from carillon.fem.model import Solid
 from carillon.files.atomic import atomic_path
 from carillon.files.datasets import find, finite
 from carillon.files.hdf5 import open_h5
-from carillon.files.vtu import HEXAHEDRON_CORNERS, Grid, Vectors, write_vtu
+from carillon.files.vtu import HEXAHEDRON_CORNERS, UnstructuredGrid, Vectors, write_vtu
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Count, between
 from solver.exchange.displayed import Displayed, displayed
@@ -43,7 +43,7 @@ class MotionOptions:
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class StreamedModes:
     """Modes whose shapes are read as they are needed."""
 
     model: Solid
@@ -54,7 +54,7 @@ class Spectrum:
     """Displacements (n, 3) of the modes from one to before another, counted from 0."""
 
     @classmethod
-    def of_file(cls, path: str | Path) -> "Spectrum":
+    def of_file(cls, path: str | Path) -> "StreamedModes":
         """The modes in a file; raises UserError, see `solver.files.modes_file.read_modes`."""
         file = read_modes(path, with_modes=False)
         rows = file.model.n_dofs
@@ -70,7 +70,7 @@ class Spectrum:
         return cls(file.model, file.frequencies, file.residuals, shapes)
 
     @classmethod
-    def of_contents(cls, file: ModesFile) -> "Spectrum":
+    def of_contents(cls, file: ModesFile) -> "StreamedModes":
         """The modes that have been read."""
         modes = file.modes
         assert modes is not None
@@ -80,7 +80,7 @@ class Spectrum:
 
         return cls(file.model, file.frequencies, file.residuals, shapes)
 
-    def grid(self, cubes: Displayed, points: Array | None = None) -> Grid:
+    def grid(self, cubes: Displayed, points: Array | None = None) -> UnstructuredGrid:
         """The cubes with their material, at other `points` (p, 3) [m] than theirs if given."""
         of_cells = {YOUNG: cubes.young, DENSITY: cubes.density}
         of_whole: dict[str, NDArray[Any]] = {
@@ -89,10 +89,10 @@ class Spectrum:
         }
         corners = cubes.cells[:, HEXAHEDRON_CORNERS]
         place = cubes.points if points is None else points
-        return Grid(place, corners, cell_data=of_cells, field_data=of_whole)
+        return UnstructuredGrid(place, corners, cell_data=of_cells, field_data=of_whole)
 
 
-def write_all_modes(path: str | Path, spectrum: Spectrum) -> None:
+def write_all_modes(path: str | Path, spectrum: StreamedModes) -> None:
     """Write a VTU file with the cubes of a solid and its modes, a few of which are held at a time.
 
     Raises UserError if it cannot be written.
@@ -106,7 +106,7 @@ def write_all_modes(path: str | Path, spectrum: Spectrum) -> None:
     write_vtu(path, spectrum.grid(cubes), Vectors(names, values))
 
 
-def write_motion(path: str | Path, spectrum: Spectrum, motion: MotionOptions) -> list[Path]:
+def write_motion(path: str | Path, spectrum: StreamedModes, motion: MotionOptions) -> list[Path]:
     """Write one period of a mode: a VTU file a phase, and the list of them (PVD), which is last.
 
     The cubes are moved; time is in periods. Returns the files of the phases. Raises UserError if
