@@ -18,6 +18,7 @@ from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.orientation import turned_alike
 from carillon.fem.geometry.plain_files import obj_of_off, plain_obj, require_plain_ply, whole_stl
+from carillon.fem.geometry.volume_files import READERS, is_volume_file, read_volume_mesh
 from carillon.files.paths import require_file
 from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
 
@@ -25,7 +26,7 @@ from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
 FLATNESS = 1e-6
 
 FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl", "stl_ascii")
-"""Endings of mesh files.
+"""Endings of files of surfaces; those of volume elements are `volume_files.READERS`.
 
 Of others that trimesh reads, depending on what else is installed, a few bytes may stand for any
 number: archives (zip, 3mf), parts that hold each other (3mf, dae), entities (xaml, dae).
@@ -45,7 +46,8 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     ----------
     mesh
         Path of a file in one of `FORMATS` (obj, stl, ply, off, glb, ...; the objects of a scene are
-        concatenated), or ``builtin:NAME`` for a built-in object.
+        concatenated), of a mesh with volume elements (msh, vtu, ...), whose outer faces are the
+        surface, or ``builtin:NAME`` for a built-in object.
     unit
         Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
         them it is a scale factor.
@@ -100,6 +102,8 @@ _PLY_LENGTH = "PLY is unexpected length"
 
 
 def _read(path: Path) -> trimesh.Trimesh:
+    if is_volume_file(path):
+        return read_volume_mesh(path).surface
     _require_mesh_file(path)
     # trimesh logs warnings about odd files; the person gets one sentence instead.
     logger = logging.getLogger("trimesh")
@@ -161,7 +165,7 @@ def _require_mesh_file(path: Path) -> None:
     if path.suffix.lstrip(".").lower() not in FORMATS:
         raise UserError(
             f"{path}: the mesh format {path.suffix or '(no ending)'!r} is not read; convert the "
-            f"mesh to one of {', '.join(FORMATS)}"
+            f"mesh to one of {', '.join((*FORMATS, *READERS))}"
         )
     size = path.stat().st_size
     if size > MESH_BYTES:
