@@ -160,6 +160,7 @@ each(
     MESH,
     (
         "ZOO/empty.obj ZOO/empty.stl ZOO/empty.ply ZOO/empty.glb ZOO/empty.off ZOO/empty.gltf "
+        "ZOO/{empty,junk}.{msh,vtu,vtk,inp,med,mesh} "
         "ZOO/empty.3mf ZOO/junk.obj ZOO/junk.stl ZOO/junk.ply ZOO/junk.glb ZOO/junk.off "
         "ZOO/junk.gltf ZOO/junk.3mf ZOO/cut.stl ZOO/cut.ply ZOO/cut.glb ZOO/claims.stl "
         "ZOO/claims.ply ZOO/claims.off ZOO/claims.glb ZOO/{foreign,relative}.gltf ZOO/box.xyzzy "
@@ -171,7 +172,8 @@ each(
     MESH,
     (
         "ZOO/grows-{zeros,sparse,instances,chain,circle,rows}.glb ZOO/grows-buffer.gltf "
-        "ZOO/grows-parts.3mf ZOO/grows-parts.dae"
+        "ZOO/grows-parts.3mf ZOO/grows-text.3mf ZOO/grows-{points,blocks}.vtu ZOO/grows-image.vtk "
+        "ZOO/grows-nodes.msh ZOO/grows-parts.dae"
     ),
 )
 each(

@@ -71,7 +71,7 @@ SHAPES = {
 
 
 @dataclass(frozen=True)
-class Faces:
+class CellFaces:
     """The same face of all elements of one kind."""
 
     corners: Index
@@ -82,7 +82,7 @@ class Faces:
     """(a, 3) points in the middle of curved faces, which come after those of the mesh."""
 
 
-def faces_of(name: str, cells: Index, points: Array, added: int) -> Iterator[Faces]:
+def faces_of(name: str, cells: Index, points: Array, added: int) -> Iterator[CellFaces]:
     """The faces of elements (c, nodes), one after the other.
 
     Neighbours cut a face alike: plane squares along the diagonal from the corner with the lowest
@@ -92,14 +92,14 @@ def faces_of(name: str, cells: Index, points: Array, added: int) -> Iterator[Fac
     for number, face in enumerate(shape.faces):
         corners = cells[:, face]
         if not shape.edges:
-            yield Faces(corners, _plain(corners), np.empty((0, 3)))
+            yield CellFaces(corners, _plain(corners), np.empty((0, 3)))
             continue
         around = list(zip(face, (*face[1:], face[0]), strict=True))
         middles = cells[:, [shape.middle_of(*ends) for ends in around]]
         count = len(face)
         if count == 3:
             inner = [corners, middles]
-            yield Faces(corners, _cut_triangle(*inner), np.empty((0, 3)))
+            yield CellFaces(corners, _cut_triangle(*inner), np.empty((0, 3)))
             continue
         new = np.empty((0, 3))
         if number in shape.middles:
@@ -111,7 +111,7 @@ def faces_of(name: str, cells: Index, points: Array, added: int) -> Iterator[Fac
         ring = np.stack([corners, middles], axis=2).reshape(len(cells), 2 * count)
         following = np.roll(ring, -1, axis=1)
         middle = np.broadcast_to(centre[:, None], ring.shape)
-        yield Faces(corners, np.stack([ring, following, middle], axis=2), new)
+        yield CellFaces(corners, np.stack([ring, following, middle], axis=2), new)
 
 
 def _plain(corners: Index) -> Index:
