@@ -118,7 +118,9 @@ class Mesh:
 
 
 def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """The surface in a mesh file (OBJ, STL, PLY, OFF, glTF), or `builtin:NAME`.
+    """The surface in a mesh file, or `builtin:NAME`.
+
+    Files are OBJ, STL, PLY, OFF, glTF, 3MF, or of volume elements (Gmsh, VTU, Abaqus, ...).
 
     Raises UserError if there is no such mesh, or it is no surface around a solid. `unit`: metres
     per unit of the file.

@@ -116,6 +116,15 @@ def read_labels(
         `carillon.fem.geometry.label_grids.read_grid`.
     array
         Name of the array; the first of `LABELS` unless given, and of `.npy` its only one.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/parts.npy", np.array([[[3]], [[5]]]))
+    ...     labels = read_labels(f"{folder}/parts.npy", box=np.array([[0, 0, 0], [2, 1, 1]]))
+    >>> labels.at(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]])).tolist()
+    [3, 5, -1]
     """
     cells, data, names = _read(path, unit, box)
     values = _chosen(path, data, array, LABELS, "labels")
@@ -133,7 +142,17 @@ def read_labels(
 def read_cell_moduli(
     path: str | Path, unit: float = 1.0, array: str | None = None, box: Array | None = None
 ) -> CellModuli:
-    """Young's moduli [Pa] in a file, see `read_labels`; `array`: the first of `MODULI`."""
+    """Young's moduli [Pa] in a file, see `read_labels`; `array`: the first of `MODULI`.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/young.npy", np.array([[[1e9]], [[2e9]]]))
+    ...     moduli = read_cell_moduli(f"{folder}/young.npy", box=np.array([[0, 0, 0], [2, 1, 1]]))
+    >>> moduli.at(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]])).tolist()
+    [1000000000.0, 2000000000.0]
+    """
     cells, data, _ = _read(path, unit, box)
     values = _chosen(path, data, array, MODULI, "Young's moduli").astype(float)
     return CellModuli(str(path), cells, values)

@@ -48,6 +48,17 @@ def read_volume_mesh(path: str | Path, unit: float = 1.0) -> VolumeMesh:
     Elements of fewer dimensions are left out. Raises UserError if the file is missing, longer than
     `MESH_BYTES`, unreadable, or names other files; if it has no volume elements, or those name
     points that are not there, or have coordinates that are not finite. `unit`: metres per unit.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> nodes = "*NODE", "1,0,0,0", "2,1,0,0", "3,0,1,0", "4,0,0,1"
+    >>> with TemporaryDirectory() as folder, open(f"{folder}/one.inp", "w") as file:
+    ...     for line in (*nodes, "*ELEMENT, TYPE=C3D4", "1,1,2,3,4"):
+    ...         print(line, file=file, flush=True)
+    ...     mesh = read_volume_mesh(f"{folder}/one.inp", unit=3.0)
+    >>> mesh.n_cells, round(mesh.surface.volume, 9)
+    (1, 4.5)
     """
     path = require_file(path, f"a mesh ({', '.join(READERS)})")
     require_within(f"unit {unit:g} m", unit, UNITS)
