@@ -70,11 +70,12 @@ def _petsc(path: Path, matrix: sp.csr_matrix, _: str) -> None:
             "format with indices of 32 bits; write .mtx or .npz"
         )
     with open(path, "wb") as stream:
-        np.array([_PETSC_MATRIX, *matrix.shape, matrix.nnz], dtype=">i4").tofile(stream)
-        np.diff(matrix.indptr).astype(">i4").tofile(stream)
+        head = np.array([_PETSC_MATRIX, *matrix.shape, matrix.nnz], dtype=">i4")
+        stream.write(head.tobytes())
+        stream.write(np.diff(matrix.indptr).astype(">i4").tobytes())
         for values, kind in ((matrix.indices, ">i4"), (matrix.data, ">f8")):
             for first in range(0, matrix.nnz, _AT_ONCE):
-                values[first : first + _AT_ONCE].astype(kind).tofile(stream)
+                stream.write(values[first : first + _AT_ONCE].astype(kind).tobytes())
 
 
 def _npz(path: Path, matrix: sp.csr_matrix, _: str) -> None:

@@ -16,7 +16,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry.abaqus_mesh import OTHERS, read_abaqus
 from carillon.fem.geometry.cell_shapes import SHAPES
 from carillon.fem.geometry.volume_mesh import Block, VolumeMesh
-from carillon.files.content import require_whole
+from carillon.files.hdf5 import require_whole_h5
 from carillon.files.paths import first_line, require_file
 from carillon.files.vtk_xml import VtkFile
 from carillon.limits import MESH_BYTES, UNITS, require_within
@@ -218,10 +218,7 @@ def _require_by_itself(path: Path) -> None:
     """Refuse files that name others, and those in which a few bytes stand for any number."""
     kind = path.suffix.lower()
     if kind == ".med":
-        import h5py
-
-        with h5py.File(path, "r", locking=False) as file:
-            require_whole(file)
+        require_whole_h5(path)
         return
     dataset = _DATASET.search(path.read_bytes()) if kind == ".vtk" else None
     if dataset is not None and dataset[1].upper() != b"UNSTRUCTURED_GRID":
