@@ -14,6 +14,7 @@ from carillon.fem.geometry import load_surface
 from carillon.fem.geometry.cell_shapes import SHAPES
 from carillon.fem.geometry.labels import read_cell_moduli, read_labels
 from carillon.fem.geometry.volume_files import read_volume_mesh
+from carillon.fem.materials import young_modulus
 from tests.volume_meshes import box, write
 
 SIDES = np.array([0.3, 0.2, 0.1])
@@ -151,8 +152,12 @@ def test_moduli_come_back_from_what_is_written_for_paraview(tmp_path):
 
 def test_moduli_of_another_place_are_refused(tmp_path):
     path = written(tmp_path, "vtu")
-    with pytest.raises(UserError, match="voxels lie outside its cells.*unit"):
-        ca.Material(str(path)).moduli(ca.load_mesh(path, unit=4.0).hexahedra(8))
+    for unit, sentence in ((4.0, "voxels lie outside its cells"), (0.001, "its cells measure 0.3")):
+        with pytest.raises(UserError, match=f"{sentence}.*unit"):
+            ca.Material(str(path)).moduli(ca.load_mesh(path, unit=unit).hexahedra(8))
+    millimetres = ca.load_mesh(path, unit=0.001).hexahedra(8)
+    young = young_modulus(str(path), millimetres, unit=0.001)
+    np.testing.assert_array_equal(np.unique(young), [1e9, 3e9])
 
 
 # Grids --------------------------------------------------------------------------------------------

@@ -39,6 +39,10 @@ class BoxGrid(LocatedCells):
     def n_cells(self) -> int:
         return math.prod(self.shape)
 
+    @property
+    def longest_side(self) -> float:
+        return float((self.spacing * self.shape).max())
+
     def cells_at(self, points: Array, nearest: bool = False) -> Index:
         place = (np.asarray(points, dtype=float) - self.origin) @ self.axes / self.spacing
         sizes = np.array(self.shape)

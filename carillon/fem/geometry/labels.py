@@ -44,6 +44,8 @@ MODULI = (
     "e",
 )
 """Names of arrays that hold Young's moduli [Pa], likewise."""
+MOST_LARGER = 8.0
+"""Longest side of all cells over that of the points, beyond which they are in another unit."""
 MOST_OUTSIDE = 0.5
 """Share of the points outside all cells beyond which moduli are of another solid or unit."""
 OUTSIDE = -1
@@ -83,7 +85,8 @@ class CellModuli:
     def at(self, points: Array) -> Array:
         """Moduli (p,) [Pa] at `points` (p, 3) [m], outside those of the nearest cell.
 
-        Raises UserError if most points are outside, as where a unit is mistaken.
+        Raises UserError if most points are outside, or the cells are far larger than what the
+        points are spread over, as where a unit is mistaken.
         """
         cells = self.cells.cells_at(points)
         outside = np.flatnonzero(cells < 0)
@@ -91,6 +94,12 @@ class CellModuli:
             raise UserError(
                 f"{self.name}: {len(outside):,} of {len(points):,} voxels lie outside its cells, "
                 "expected moduli all over the solid; see that place and unit are those of the mesh"
+            )
+        own, longest = self.cells.longest_side, float(np.ptp(points, axis=0).max(initial=0.0))
+        if len(points) > 1 and own > MOST_LARGER * longest:
+            raise UserError(
+                f"{self.name}: its cells measure {own:.4g} m, the voxels {longest:.4g} m, expected "
+                "moduli of this solid; see that its unit is that of the mesh"
             )
         cells[outside] = self.cells.cells_at(points[outside], nearest=True)
         return np.asarray(self.values[cells])

@@ -13,6 +13,11 @@ class LocatedCells(ABC):
     def n_cells(self) -> int:
         """Number of cells."""
 
+    @property
+    @abstractmethod
+    def longest_side(self) -> float:
+        """Longest side of the box around all cells [m], along their own axes."""
+
     @abstractmethod
     def cells_at(self, points: Array, nearest: bool = False) -> Index:
         """Cell (p,) that each of `points` (p, 3) [m] lies in, -1 outside all.

@@ -77,6 +77,10 @@ class VolumeMesh(LocatedCells):
         start = np.searchsorted(parts.cell[order], np.arange(self.n_cells + 1))
         return CellSearch(parts.points, parts.triangles[order], start)
 
+    @property
+    def longest_side(self) -> float:
+        return float(self.surface.extents.max())
+
     def cells_at(self, points: Array, nearest: bool = False) -> Index:
         points = np.ascontiguousarray(points, dtype=float)
         cells = self._search.cells_at(points)
