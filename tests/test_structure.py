@@ -63,7 +63,7 @@ ARROWS = {
     "solver.subspace": "solver.assembly solver.distribution",
     "solver.linear": "solver.assembly solver.distribution",
     "solver.response": "solver.files solver.subspace",
-    "solver.exchange": "solver.assembly solver.files",
+    "solver.exchange": "solver.assembly solver.files solver.response",
     "solver.reference": "solver.assembly solver.linear solver.subspace",
     "solver.correction": "solver.assembly solver.distribution solver.linear solver.subspace",
     "solver.hcms": "solver.assembly solver.distribution solver.linear solver.subspace",

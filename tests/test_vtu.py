@@ -9,9 +9,9 @@ import pytest
 import carillon as ca
 from carillon.command_line.exit_status import EXIT_BAD_INPUT
 from carillon.fem.geometry import CORNER_OFFSETS
+from carillon.files.vtu import HEXAHEDRON_CORNERS
 from solver.__main__ import main
-from solver.exchange.displayed import displayed
-from solver.exchange.modes_vtu import DENSITY, YOUNG
+from solver.exchange.displayed import DENSITY, YOUNG, displayed
 from tests import solids
 from tests.cut_solids import uniform
 from tests.test_divided_cells import divided
@@ -49,9 +49,10 @@ def test_cubes_are_the_elements_where_they_are(model):
     span = np.ones(mesh.n_cells, dtype=int) if mesh.span is None else mesh.span.astype(int)
     places = mesh.grid[:, None] + span[:, None, None] * CORNER_OFFSETS
     expected = mesh.origin + mesh.edge * places
-    np.testing.assert_allclose(shown.points[shown.cells], expected, atol=1e-12)
+    corners = shown.points[shown.cells][:, HEXAHEDRON_CORNERS]
+    np.testing.assert_allclose(corners, expected, atol=1e-12)
     volumes = (span * mesh.edge) ** 3
-    assert shown.density @ volumes == pytest.approx(model.mass, rel=1e-9)
+    assert shown.data[DENSITY] @ volumes == pytest.approx(model.mass, rel=1e-9)
     gradient = np.random.default_rng(0).standard_normal((3, 3))
     np.testing.assert_allclose(
         shown.vectors(mesh.nodes @ gradient), shown.points @ gradient, atol=1e-12
@@ -114,3 +115,31 @@ def test_what_cannot_be_written_is_told_and_leaves_nothing(
     assert main(["vtu", *words]) == EXIT_BAD_INPUT
     assert sentence in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["voxels", "cells"])
+def test_a_surface_moves_with_the_solid(files, tmp_path, name):
+    out = tmp_path / "s.vtu"
+    words = ["vtu", str(files / f"{name}.h5"), "--surface", "builtin:bar", "--out", str(out)]
+    assert main(words) == 0
+    grid, solution = meshio.read(out), ca.read(files / f"{name}.h5")
+    bar, edge = ca.load_mesh("builtin:bar"), solution.mesh.edge
+    corners = grid.points[grid.cells_dict["triangle"]]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert sides.max() <= edge * (1.0 + 1e-9)
+    areas = 0.5 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    assert areas.sum() == pytest.approx(bar.surface.area)
+    # Rigid motions are linear in the place, and those of the nodes are those of the surface.
+    shape, nodes = solution.shapes[0], solution.mesh.nodes
+    linear = np.linalg.lstsq(np.column_stack([nodes, np.ones(len(nodes))]), shape, rcond=None)[0]
+    found = next(iter(grid.point_data.values()))
+    expected = np.column_stack([grid.points, np.ones(len(grid.points))]) @ linear
+    np.testing.assert_allclose(found, expected, atol=1e-6 * abs(shape).max())
+
+
+def test_a_surface_of_something_else_is_refused(files, tmp_path, capsys):
+    words = ["--surface", "builtin:bell", "--out", str(tmp_path / "s.vtu")]
+    assert main(["vtu", str(files / "voxels.h5"), *words]) == EXIT_BAD_INPUT
+    assert "expected the surface of their solid" in capsys.readouterr().err

@@ -33,8 +33,8 @@ TYPES = {
     )
 }
 """VTK's names of numbers."""
-HEXAHEDRON = 12
-"""VTK's number of the cube with eight corners."""
+TRIANGLE, HEXAHEDRON = 5, 12
+"""VTK's numbers of the triangle, and of the cube with eight corners."""
 HEXAHEDRON_CORNERS = [0, 1, 3, 2, 4, 5, 7, 6]
 """VTK's order of its corners, as numbers of corners in bit order."""
 _COUNT = np.dtype(np.uint64)

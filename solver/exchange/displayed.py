@@ -1,36 +1,44 @@
-"""Cubes that show a solid: its elements or the octants of its finite cells, and motion of them.
+"""What shows a solid: cubes of its elements or of the octants of its finite cells, or its surface.
 
 Corners that hang between larger elements are points of their own, so that every cube has eight, at
 its own corners, and is seen where the model has it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Index, Surface
+from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry.hanging import node_weights
 from carillon.fem.model import Solid
+from carillon.files.vtu import HEXAHEDRON, HEXAHEDRON_CORNERS, TRIANGLE
+from solver.response.points import interpolation
+
+YOUNG, DENSITY = "Young's modulus [Pa]", "density [kg/m^3]"
+"""Arrays of the cubes: means over each of them, what of it is void included in the density."""
+MOST_TRIANGLES = 20_000_000
+"""Triangles that a surface may be cut into."""
 
 
 @dataclass(frozen=True, eq=False)
 class Displayed:
-    """Cubes of a solid, with their material."""
+    """Cells that show a solid."""
 
-    cells: Index
-    """(c, 8) points of each cube, in bit order."""
-    interpolation: sp.csr_matrix | None
-    """(p, n) values of the points from those of the nodes; None if points are the nodes."""
     points: Array
     """(p, 3) [m]."""
-    young: Array
-    """(c,) mean Young's modulus [Pa]."""
-    density: Array
-    """(c,) mass over volume of each cube [kg/m^3], with what of it is void."""
+    cells: Index
+    """(c, k) points of each, in VTK's order."""
+    kind: int
+    """VTK's number of the kind of cell."""
+    interpolation: sp.csr_matrix | None
+    """(p, n) values of the points from those of the nodes; None if points are the nodes."""
+    data: dict[str, Array] = field(default_factory=dict)
+    """(c,) of each array of the cells."""
 
     def vectors(self, displacement: Array) -> Array:
         """Displacement (p, 3) of the points from that (n, 3) of the nodes."""
@@ -47,15 +55,43 @@ def displayed(model: Solid) -> Displayed:
     voxel, is one cube, whose corners never hang.
     """
     mesh = model.mesh
-    young = model.young.reshape(mesh.n_cells, -1).mean(axis=1)
+    cells, matrix = mesh.cells, None
     if isinstance(model, FiniteCellModel):
         share = _shares(model.cells)
     else:
         share = model.filled.mean(axis=1)
         if mesh.kinds is not None and mesh.hanging is not None:
             cells, matrix = _with_hanging(mesh.cells, mesh.hanging, node_weights()[mesh.kinds])
-            return Displayed(cells, matrix, matrix @ mesh.nodes, young, model.density * share)
-    return Displayed(mesh.cells, None, mesh.nodes, young, model.density * share)
+    points = mesh.nodes if matrix is None else matrix @ mesh.nodes
+    young = model.young.reshape(mesh.n_cells, -1).mean(axis=1)
+    data = {YOUNG: young, DENSITY: model.density * share}
+    return Displayed(points, cells[:, HEXAHEDRON_CORNERS], HEXAHEDRON, matrix, data)
+
+
+def displayed_surface(model: Solid, surface: Surface, name: str) -> Displayed:
+    """The surface of a solid, cut into triangles no longer than a voxel, moved with its elements.
+
+    Raises UserError if it is the surface of something else, or would be cut into too many.
+    """
+    from trimesh.remesh import subdivide_to_size
+
+    edge, box = model.mesh.edge, np.asarray(surface.bounds)
+    apart = np.abs(box - model.mesh.bounds).max()
+    # Finite cells reach beyond the surface by less than their edge, which is that of two voxels.
+    if apart > 2.0 * edge:
+        raise UserError(
+            f"{name}: its box is up to {apart:.4g} m off that of the modes, expected the surface "
+            "of their solid; see whether --unit is that of the modes"
+        )
+    count = len(surface.faces) + 8.0 * surface.area / edge**2
+    if count > MOST_TRIANGLES:
+        raise UserError(
+            f"{name}: would be cut into about {count:.2g} triangles, the limit is "
+            f"{MOST_TRIANGLES:,}; leave out --surface"
+        )
+    points, faces = subdivide_to_size(surface.vertices, surface.faces, edge, max_iter=64)
+    points = np.asarray(points)
+    return Displayed(points, np.asarray(faces), TRIANGLE, interpolation(model, points))
 
 
 def _shares(cells: FiniteCells) -> Array:

@@ -15,7 +15,7 @@ from carillon.fem.model import Solid
 from carillon.files.atomic import atomic_path
 from carillon.files.datasets import find, finite
 from carillon.files.hdf5 import open_h5
-from carillon.files.vtu import HEXAHEDRON_CORNERS, UnstructuredGrid, Vectors, write_vtu
+from carillon.files.vtu import UnstructuredGrid, Vectors, write_vtu
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import Count, between
 from solver.exchange.displayed import Displayed, displayed
@@ -23,8 +23,6 @@ from solver.files.modes_file import KIND, SCHEMA, ModesFile, read_modes
 
 VTU, PVD = ".vtu", ".pvd"
 """Endings of a file of modes, and of a list of files over time."""
-YOUNG, DENSITY = "Young's modulus [Pa]", "density [kg/m^3]"
-"""Arrays of the cells."""
 FREQUENCIES, RESIDUALS = "frequencies [Hz]", "residuals"
 """Arrays that belong to the whole."""
 DISPLACEMENT = "displacement [m]"
@@ -80,47 +78,53 @@ class StreamedModes:
 
         return cls(file.model, file.frequencies, file.residuals, shapes)
 
-    def grid(self, cubes: Displayed, points: Array | None = None) -> UnstructuredGrid:
-        """The cubes with their material, at other `points` (p, 3) [m] than theirs if given."""
-        of_cells = {YOUNG: cubes.young, DENSITY: cubes.density}
+    def grid(self, shown: Displayed, points: Array | None = None) -> UnstructuredGrid:
+        """The cells with their data, at other `points` (p, 3) [m] than theirs if given."""
         of_whole: dict[str, NDArray[Any]] = {
             FREQUENCIES: self.frequencies,
             RESIDUALS: self.residuals,
         }
-        corners = cubes.cells[:, HEXAHEDRON_CORNERS]
-        place = cubes.points if points is None else points
-        return UnstructuredGrid(place, corners, cell_data=of_cells, field_data=of_whole)
+        place = shown.points if points is None else points
+        return UnstructuredGrid(place, shown.cells, shown.kind, shown.data, of_whole)
 
 
-def write_all_modes(path: str | Path, spectrum: StreamedModes) -> None:
-    """Write a VTU file with the cubes of a solid and its modes, a few of which are held at a time.
+def write_all_modes(
+    path: str | Path, spectrum: StreamedModes, shown: Displayed | None = None
+) -> None:
+    """Write a VTU file of the modes, a few of which are held at a time.
 
-    Raises UserError if it cannot be written.
+    It shows the cubes of the solid unless something else is given. Raises UserError if it cannot be
+    written.
     """
-    cubes = displayed(spectrum.model)
+    shown = displayed(spectrum.model) if shown is None else shown
     count = len(spectrum.frequencies)
     names = [
         f"mode {number}, {hertz:.4g} Hz" for number, hertz in enumerate(spectrum.frequencies, 1)
     ]
-    values = (cubes.vectors(shape) for shape in spectrum.shapes(0, count))
-    write_vtu(path, spectrum.grid(cubes), Vectors(names, values))
+    values = (shown.vectors(shape) for shape in spectrum.shapes(0, count))
+    write_vtu(path, spectrum.grid(shown), Vectors(names, values))
 
 
-def write_motion(path: str | Path, spectrum: StreamedModes, motion: MotionOptions) -> list[Path]:
+def write_motion(
+    path: str | Path,
+    spectrum: StreamedModes,
+    motion: MotionOptions,
+    shown: Displayed | None = None,
+) -> list[Path]:
     """Write one period of a mode: a VTU file a phase, and the list of them (PVD), which is last.
 
-    The cubes are moved; time is in periods. Returns the files of the phases. Raises UserError if
-    there is no such mode, or a file cannot be written.
+    The cubes, or what else is `shown`, are moved; time is in periods. Returns the files of the
+    phases. Raises UserError if there is no such mode, or a file cannot be written.
     """
     path, count = Path(path), len(spectrum.frequencies)
     if motion.mode is None or motion.mode > count:
         given = "none" if motion.mode is None else f"{motion.mode:,}"
         raise UserError(f"mode: found {given}, expected the number of one that moves, 1 to {count}")
-    cubes = displayed(spectrum.model)
+    shown = displayed(spectrum.model) if shown is None else shown
     (shape,) = spectrum.shapes(motion.mode - 1, motion.mode)
-    vectors = cubes.vectors(shape)
+    vectors = shown.vectors(shape)
     largest = float(np.sqrt((vectors**2).sum(axis=1).max(initial=0.0)))
-    longest = float(np.ptp(cubes.points, axis=0).max())
+    longest = float(np.ptp(shown.points, axis=0).max())
     vectors = vectors * (motion.amplitude * longest / largest if largest > 0.0 else 0.0)
     digits = len(str(motion.frames - 1))
     frames = [
@@ -128,7 +132,7 @@ def write_motion(path: str | Path, spectrum: StreamedModes, motion: MotionOption
     ]
     for number, frame in enumerate(frames):
         moved = np.sin(2.0 * np.pi * number / motion.frames) * vectors
-        grid = spectrum.grid(cubes, cubes.points + moved)
+        grid = spectrum.grid(shown, shown.points + moved)
         write_vtu(frame, grid, Vectors([DISPLACEMENT], [moved]))
     _write_list(path, frames)
     return frames
