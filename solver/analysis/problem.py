@@ -12,7 +12,13 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.composition.composition import PlacedRegions
-from carillon.composition.entries import CompositionEntry, Placed, compose, read_composition
+from carillon.composition.entries import (
+    CompositionEntry,
+    Placed,
+    SolidFrame,
+    compose,
+    read_composition,
+)
 from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem import materials
@@ -180,7 +186,7 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     surface.doubt_unit()
     meshed = time.perf_counter()
     label = f"mesh '{surface.name}', resolution {options.resolution}"
-    young = young_modulus(options.material, mesh, options.seed, label)
+    young = young_modulus(options.material, mesh, options.seed, label, options.unit)
     composed = _composed(options, surface)
     placed = PlacedRegions(Regions.one(options.poisson, options.density))
     if composed.composition is not None:
@@ -211,7 +217,8 @@ def _composed(options: ProblemOptions, surface: SolidSurface) -> Placed:
     entry, folder = CompositionEntry(), Path()
     if options.regions is not None:
         entry, folder = read_composition(options.regions), Path(options.regions).parent
-    return compose(entry, surface.triangles, surface.name, folder, options.fix or ())
+    frame = SolidFrame(options.mesh, surface.triangles, surface.name, options.unit, folder)
+    return compose(entry, frame, options.fix or ())
 
 
 def _held(solid: Held, composed: Placed, surface: SolidSurface) -> Held:

@@ -19,7 +19,7 @@ from carillon.fem.model import Solid
 from carillon.files.vtu import HEXAHEDRON, HEXAHEDRON_CORNERS, TRIANGLE
 from solver.response.points import interpolation
 
-YOUNG, DENSITY = "Young's modulus [Pa]", "density [kg/m^3]"
+YOUNG, DENSITY, REGION = "Young's modulus [Pa]", "density [kg/m^3]", "region"
 """Arrays of the cubes: means over each of them, what of it is void included in the density."""
 MOST_TRIANGLES = 20_000_000
 """Triangles that a surface may be cut into."""
@@ -64,8 +64,31 @@ def displayed(model: Solid) -> Displayed:
             cells, matrix = _with_hanging(mesh.cells, mesh.hanging, node_weights()[mesh.kinds])
     points = mesh.nodes if matrix is None else matrix @ mesh.nodes
     young = model.young.reshape(mesh.n_cells, -1).mean(axis=1)
-    data = {YOUNG: young, DENSITY: model.density * share}
+    data = {YOUNG: young, DENSITY: _density(model, share)}
+    if model.region is not None:
+        data[REGION] = _region(model).astype(np.int32)
     return Displayed(points, cells[:, HEXAHEDRON_CORNERS], HEXAHEDRON, matrix, data)
+
+
+def _region(model: Solid) -> NDArray[np.integer]:
+    """Region (m,) of each cube; of a coarse element the one that most of it is of."""
+    assert model.region is not None
+    if model.region.ndim == 1:
+        return model.region
+    filled = model.filled
+    votes = ((model.region[:, :, None] == model.region[:, None]) & filled[:, None]).sum(axis=2)
+    most = np.where(filled, votes, -1).argmax(axis=1)
+    return np.asarray(model.region[np.arange(len(most)), most])
+
+
+def _density(model: Solid, share: Array) -> Array:
+    """Mean density (m,) [kg/m^3] of cubes of which a share (m,) holds material."""
+    density = model.regions.density
+    if model.region is None:
+        return float(density[0]) * share
+    if model.region.ndim == 1:
+        return np.asarray(density[model.region] * share)
+    return np.asarray((density[model.region] * model.filled).mean(axis=1))
 
 
 def displayed_surface(model: Solid, surface: Surface, name: str) -> Displayed:
