@@ -152,21 +152,22 @@ class RegionEntry:
                 )
             return Box(low, high)
         if self.labels is not None and self.label is not None:
-            return _labelled(solid.path(self.labels), self.label, self.unit, solid)
-        surface = self.surface(solid)
-        return Everywhere() if surface is None else ClosedSurface(surface)
+            return _labelled(_path(self.labels, solid.folder), self.label, self.unit, solid)
+        if self.mesh is not None:
+            return ClosedSurface(self.own_surface(solid.folder))
+        if self.part is not None:
+            return ClosedSurface(_part(solid.mesh, self.part, solid.unit, self.name))
+        return Everywhere()
 
-    def surface(self, solid: SolidFrame) -> Surface | None:
-        """The closed surface around it, if that is how it is given."""
+    def own_surface(self, folder: Path) -> Surface:
+        """The closed surface in its mesh file, which is relative to a folder."""
         from carillon.fem.geometry import load_surface  # Its import takes long.
 
+        assert self.mesh is not None
+        path = _path(self.mesh, folder)
         if self.part is not None:
-            own = self.mesh is None
-            path = solid.mesh if self.mesh is None else solid.path(self.mesh)
-            return _part(path, self.part, solid.unit if own else self.unit, self.name)
-        if self.mesh is not None:
-            return load_surface(solid.path(self.mesh), self.unit)
-        return None
+            return _part(path, self.part, self.unit, self.name)
+        return load_surface(path, self.unit)
 
     def axes(self) -> np.ndarray | AxesAt | None:
         """Axes of the material, or where they lie at each place."""
@@ -260,10 +261,12 @@ class CompositionEntry:
                 raise ValueError(f"two regions are called {name!r}; give each a name of its own")
 
 
+def _path(file: str, folder: Path) -> str:
+    return file if file.startswith("builtin:") else str(folder / file)
+
+
 def _part(path: str, name: str, unit: float, region: str) -> Surface:
     """All parts of that name together."""
-    import trimesh
-
     from carillon.fem.geometry.parts import named_surfaces
 
     parts = named_surfaces(path, unit)
@@ -271,7 +274,7 @@ def _part(path: str, name: str, unit: float, region: str) -> Surface:
     if not own:
         known = ", ".join(sorted({each for each, _ in parts}))
         raise UserError(f"region {region!r}: {path} has no part {name!r}, only {known}")
-    return own[0] if len(own) == 1 else trimesh.util.concatenate(own)
+    return own[0] if len(own) == 1 else _joined(own)
 
 
 def _labelled(path: str, label: str, unit: float, solid: SolidFrame) -> Domain:
@@ -300,10 +303,6 @@ class SolidFrame:
     folder: Path = Path()
     """That files of entries are relative to."""
 
-    def path(self, file: str) -> str:
-        """A file of an entry."""
-        return file if file.startswith("builtin:") else str(self.folder / file)
-
 
 @dataclass(frozen=True)
 class Placed:
@@ -311,6 +310,11 @@ class Placed:
 
     composition: Composition | None
     supports: tuple[Support, ...]
+
+
+def describes_regions(path: str) -> bool:
+    """Whether a solid is given by a file of regions in place of a mesh."""
+    return Path(path).suffix.lower() in (".yaml", ".yml")
 
 
 def read_composition(path: str | Path) -> CompositionEntry:
@@ -343,18 +347,22 @@ def joined_surface(entry: CompositionEntry, path: str) -> Surface:
 
     Raises UserError if one is not, or there are none.
     """
-    import trimesh
-
-    nothing = trimesh.Trimesh()
-    solid = SolidFrame(path, nothing, Path(path).stem, folder=Path(path).parent)
-    surfaces = []
+    folder = Path(path).parent
+    surfaces: list[Surface] = []
     for each in entry.regions:
         if each.mesh is None:
             raise UserError(
                 f"{path}: region {each.name!r} has no mesh; a solid made of its regions needs one "
                 "of each, or name the solid's own mesh and --regions"
             )
-        surfaces.append(each.surface(solid))
+        surfaces.append(each.own_surface(folder))
     if not surfaces:
         raise UserError(f"{path}: has no regions; expected some with a mesh each")
-    return trimesh.util.concatenate(surfaces)
+    return _joined(surfaces)
+
+
+def _joined(surfaces: list[Surface]) -> Surface:
+    vertices = np.concatenate([np.asarray(each.vertices) for each in surfaces])
+    first = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
+    faces = [np.asarray(each.faces) + start for each, start in zip(surfaces, first)]
+    return type(surfaces[0])(vertices, np.concatenate(faces), process=False)

@@ -17,6 +17,7 @@ from carillon.composition.entries import (
     Placed,
     SolidFrame,
     compose,
+    describes_regions,
     read_composition,
 )
 from carillon.composition.supports import placed_supports
@@ -62,7 +63,9 @@ AUTO = "auto"
 class ProblemOptions:
     """The solid to analyse."""
 
-    mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
+    mesh: str = option(
+        REQUIRED, "surface mesh file, builtin:NAME, or YAML file of regions with a mesh each"
+    )
     resolution: Resolution = option(REQUIRED)
     material: str = option(
         "uniform",
@@ -215,8 +218,11 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
 def _composed(options: ProblemOptions, surface: SolidSurface) -> Placed:
     """Regions and supports that the options name."""
     entry, folder = CompositionEntry(), Path()
-    if options.regions is not None:
-        entry, folder = read_composition(options.regions), Path(options.regions).parent
+    described = options.regions
+    if described is None and describes_regions(options.mesh):
+        described = options.mesh
+    if described is not None:
+        entry, folder = read_composition(described), Path(described).parent
     frame = SolidFrame(options.mesh, surface.triangles, surface.name, options.unit, folder)
     return compose(entry, frame, options.fix or ())
 
