@@ -30,6 +30,7 @@ EVERYBODY = (
     "carillon.fem",
     "carillon.fem.geometry",
     "carillon.fem.finite_cells",
+    "carillon.composition",
     "carillon.drawing",
 )
 """Packages that all others may import."""
@@ -47,12 +48,14 @@ ARROWS = {
     "carillon.fem": "carillon carillon.fem.geometry carillon.files carillon.processes",
     "carillon.drawing": "carillon.fem.geometry",
     "carillon.fem.finite_cells": "carillon carillon.fem carillon.fem.geometry",
+    "carillon.composition": """carillon carillon.fem carillon.fem.finite_cells carillon.fem.geometry
+        carillon.files carillon.parameters""",
     #
     "dataset_gen.objectives": "",
     "dataset_gen": "dataset_gen.objectives",
     "dataset_gen.commands": "dataset_gen dataset_gen.objectives",
     #
-    "forests": "",
+    "forests": "dataset_gen.objectives",
     "forests.training": "dataset_gen dataset_gen.objectives forests",
     "forests.commands": "forests forests.training",
     #
