@@ -12,7 +12,9 @@ from carillon.arrays import Array, Index
 from carillon.composition.domains import ClosedSurface, Domain, Placement
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells, centroids
-from carillon.fem.finite_cells.shared_cells import SharedCells, regions_of_cells
+from carillon.fem.finite_cells.kinks import Borders
+from carillon.fem.finite_cells.regions_of_cells import regions_of_cells
+from carillon.fem.finite_cells.shared_cells import SharedCells
 from carillon.fem.geometry import HexMesh
 from carillon.fem.regions import MOST, RegionOf, Regions
 
@@ -102,8 +104,7 @@ class Composition:
         found = np.where(nowhere, -1, region.astype(np.int64))
         found = self._without_holes(found, middles, cells.mesh.edge)
         if complete:
-            there = found if shared is None else np.append(found, shared.region)
-            self._require_all(there)
+            self._require_all(np.append(found, shared.region))
         return self._placed(found, middles, shared, cells)
 
     def _placed(
@@ -123,10 +124,14 @@ class Composition:
         if len(regions) > MOST:
             raise UserError(f"{len(regions):,} directions of axes; expected {MOST:,} at most")
         region = number[: len(found)].astype(np.uint16)
-        if shared is not None:
-            shared = replace(shared, region=number[len(found) :].astype(np.uint16))
         if len(regions) == 1:
             return PlacedRegions(regions)
+        if shared is not None:
+            varies = any(callable(part.axes) for part in self._parts)
+            # Kinks of two regions; where axes vary, rows of the table are no regions.
+            borders = Borders.nothing() if varies else shared.borders
+            numbers = number[len(found) :].astype(np.uint16)
+            shared = replace(shared, region=numbers, borders=borders)
         return PlacedRegions(regions, region, shared)
 
     def _turned_by_place(self, number: Index, places: Array) -> tuple[Regions, Index]:

@@ -123,7 +123,10 @@ def _placed(
         springs = areas * (along @ by_area @ along)
         return Supports(samples.points[own], springs, np.zeros(len(own)))
     nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
-    points = np.concatenate([nodes[part.domain.contains(nodes)], samples.points[own]])
+    nodes = nodes[part.domain.contains(nodes)]
+    # Held beyond the surface and on it, a face would be kept from turning, too.
+    nodes = nodes[ClosedSurface(surface).contains(nodes)]
+    points = np.concatenate([nodes, samples.points[own]])
     if not len(points):
         raise _misses(part, samples, name)
     springs = np.repeat(_stiff(solid) * along[None], len(points), axis=0)

@@ -76,7 +76,7 @@ class Elements(ABC):
 
     def stiffness(self, chosen: Chosen = slice(None)) -> Array:
         """Element stiffness matrices (c, 3 k, 3 k) [N/m] of the chosen elements."""
-        matrices = self._stiffness(chosen)
+        matrices = self.free_stiffness(chosen)
         if self.attached is not None and self.support is not None:
             self.attached.add_stiffness(self.support[chosen], matrices)
         return matrices
@@ -89,8 +89,8 @@ class Elements(ABC):
         return matrices
 
     @abstractmethod
-    def _stiffness(self, chosen: Chosen) -> Array:
-        """Stiffness without supports."""
+    def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
+        """Stiffness (c, 3 k, 3 k) [N/m] without supports."""
 
     @abstractmethod
     def _nodal_mass(self, chosen: Chosen) -> Array:
@@ -159,7 +159,7 @@ class HexElements(Elements):
             return weights
         return np.einsum("pk,pkj->pj", weights, node_weights()[self.kinds[elements]])
 
-    def _stiffness(self, chosen: Chosen) -> Array:
+    def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
         stiffness = self._uniform_edges(chosen)
         if self.kinds is None:
             return stiffness

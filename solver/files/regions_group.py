@@ -7,6 +7,7 @@ from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.elasticity import Elasticity, require_elasticity
 from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.kinks import Borders
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS
 from carillon.fem.finite_cells.shared_cells import SharedCells
 from carillon.fem.regions import Damping, RegionOf, Regions
@@ -16,6 +17,13 @@ from carillon.limits import DENSITIES, MODULI, POISSON
 
 REGIONS, SHARED, SUPPORTS = "regions", "shared", "supports"
 """Names of the groups of several materials, of what finite cells share, and of supports."""
+_BORDERS = {
+    "cell": "cell of each border of two regions",
+    "region": "regions on its two sides",
+    "place": "a point of its plane, in the cell",
+    "normal": "its unit normal",
+    "share": "share of the cell's inside on its two sides",
+}
 UNKNOWN = -1.0
 """Rayleigh coefficients of a material whose damping is not known."""
 
@@ -92,6 +100,8 @@ def put_shared(group: h5py.Group, shared: SharedCells | None) -> None:
     put(inner, "octant", shared.octant, "1", "octant of each part")
     put(inner, "region", shared.region, "1", "region of each part")
     put(inner, "weights", shared.weights, "1", "integrals of the points' Lagrange polynomials")
+    for name, meaning in _BORDERS.items():
+        put(inner, f"border_{name}", getattr(shared.borders, name), "1", meaning)
 
 
 def get_shared(group: h5py.Group, cells: FiniteCells, solid: h5py.Group) -> SharedCells | None:
@@ -110,8 +120,24 @@ def get_shared(group: h5py.Group, cells: FiniteCells, solid: h5py.Group) -> Shar
     if (cells.voxels[cell, octant] < 0).any():
         raise refused(inner, "has parts in empty octants")
     return SharedCells(
-        cell.astype(np.int64), octant.astype(np.int64), region.astype(np.uint16), weights
+        cell.astype(np.int64),
+        octant.astype(np.int64),
+        region.astype(np.uint16),
+        weights,
+        _get_borders(inner, len(cells), count),
     )
+
+
+def _get_borders(group: h5py.Group, cells: int, count: int) -> Borders:
+    cell = read(group, "border_cell", (None,), INTEGER)
+    region = read(group, "border_region", (len(cell), 2), INTEGER)
+    place, normal = (read(group, f"border_{name}", (len(cell), 3)) for name in ("place", "normal"))
+    share = read(group, "border_share", (len(cell), 2))
+    if len(cell) and not (0 <= cell.min() <= cell.max() < cells and region.max() < count):
+        raise refused(group, "names borders of cells or materials that are not there")
+    if (share <= 0.0).any() or (np.abs(np.linalg.norm(normal, axis=1) - 1.0) > 1e-6).any():
+        raise refused(group, "has borders with normals or shares that are none")
+    return Borders(cell.astype(np.int64), region.astype(np.uint16), place, normal, share)
 
 
 def put_supports(group: h5py.Group, supports: Supports | None) -> None:

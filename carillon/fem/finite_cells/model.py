@@ -12,8 +12,15 @@ from carillon.fem.block import NODES
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.hanging import at_nodes, node_places, node_weights
+from carillon.fem.finite_cells.kinks import Kinks
 from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
-from carillon.fem.finite_cells.shared_cells import SharedCells, point_moduli, point_shares
+from carillon.fem.finite_cells.shared_cells import (
+    SharedCells,
+    kinks_of,
+    point_moduli,
+    point_shares,
+    side_moduli,
+)
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
 from carillon.fem.moduli import require_moduli
@@ -25,7 +32,7 @@ from carillon.fem.supports import Attached, Supports
 class CellElements(Elements):
     """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside."""
 
-    ROWS = ("young", "share", "law", "span", "kinds", "support")
+    ROWS = ("young", "share", "law", "span", "kinds", "kink", "support")
 
     young: Array
     """(c, s, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`, of
@@ -40,6 +47,10 @@ class CellElements(Elements):
     span: NDArray[np.int32] | None = None
     kinds: Index | None = None
     """(c,) see `FiniteCells`, of cells of two sizes; else None."""
+    kink: NDArray[np.int32] | None = None
+    """(c,) numbers of the cells in `kinks`, -1 of those without."""
+    kinks: Kinks | None = None
+    """Of all cells at borders of regions; None if there are none."""
     support: NDArray[np.int32] | None = None
     attached: Attached | None = None
 
@@ -89,7 +100,7 @@ class CellElements(Elements):
             found.append((int(number), cell, young[cell, slot]))
         return found
 
-    def _stiffness(self, chosen: Chosen) -> Array:
+    def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
         edges = self.edges(chosen)
         parts = self.by_law(chosen)
         if self.law is None:
@@ -98,8 +109,21 @@ class CellElements(Elements):
             matrices = np.zeros((len(self.young[chosen]), 81 * 81))
             for number, cells, moduli in parts:
                 matrices[cells] += moduli @ point_stiffness(self.regions.laws[number])
+            self._add_kinks(chosen, matrices.reshape(-1, 81, 81))
             matrices *= edges
         return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
+
+    def _add_kinks(self, chosen: Chosen, matrices: Array) -> None:
+        if self.kinks is None or self.kink is None or self.law is None:
+            return
+        kink = self.kink[chosen]
+        own = np.flatnonzero(kink >= 0)
+        if len(own):
+            young, law = self.young[chosen][own], self.law[chosen][own]
+            moduli = side_moduli(self.kinks.borders, kink[own], law, young)
+            changed = matrices[own]
+            self.kinks.add_stiffness(kink[own], moduli, changed)
+            matrices[own] = changed
 
     def _nodal_mass(self, chosen: Chosen) -> Array:
         scale = float(self.regions.density[0]) * self.edges(chosen) ** 3
@@ -134,6 +158,7 @@ class FiniteCellModel(Solid):
         share = self._shares()
         span = self.cells.span if self.cells.is_mixed else None
         support, attached = self.attached()
+        kink, kinks = self._kinks()
         return CellElements(
             young,
             share,
@@ -142,9 +167,21 @@ class FiniteCellModel(Solid):
             law,
             span,
             self.cells.kinds,
+            kink,
+            kinks,
             support,
             attached,
         )
+
+    def _kinks(self) -> tuple[NDArray[np.int32] | None, Kinks | None]:
+        if self.region is None or self.shared is None:
+            return None, None
+        kinks = kinks_of(self.cells, self.regions, self.region, self.shared)
+        if kinks is None:
+            return None, None
+        kink = np.full(len(self.cells), -1, dtype=np.int32)
+        kink[kinks.borders.cell] = np.arange(len(kinks.borders))
+        return kink, kinks
 
     def _point_moduli(self, young: Array) -> tuple[Array, RegionOf | None]:
         if self.region is None:

@@ -72,37 +72,52 @@ class Octants:
         return found
 
 
+@dataclass(frozen=True)
+class Parts:
+    """Parts of octants by region."""
+
+    octant: Index
+    region: NDArray[np.integer]
+    weights: Array
+    """(e,), (e,), (e, 125)."""
+    border_octant: Index
+    border: Array
+    """(b,), (b, 3) [m] where lines leave one region for another."""
+
+    @classmethod
+    def nothing(cls) -> Parts:
+        """No parts."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(none, none, np.empty((0, POINTS)), none, np.empty((0, 3)))
+
+
 def parts_of_octants(
     octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt
-) -> tuple[Index, NDArray[np.integer], Array]:
-    """Parts of octants by region: octants (e,), regions (e,), and weights (e, 125).
-
-    Lines across the octant along `axis` (k,) find them.
-    """
+) -> Parts:
+    """Parts of octants that lines across them along `axis` (k,) find."""
     found = []
     # A few octants at a time, each with all of its lines.
     step = max(1, AT_ONCE // (len(_across()[0]) * (STEPS + 1)))
     for first in range(0, len(axis), step):
         few = np.arange(first, min(first + step, len(axis)))
-        row, region, weights = _parts(octants.some(few), axis[few], regions_at, inside)
-        found.append((few[row], region, weights))
-    rows, regions, parts = (np.concatenate(each) for each in zip(*found, strict=True))
-    return rows, regions, parts
+        parts = _parts(octants.some(few), axis[few], regions_at, inside)
+        rows = few[parts.octant], parts.region, parts.weights
+        found.append((*rows, few[parts.border_octant], parts.border))
+    return Parts(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
-def _parts(
-    octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt
-) -> tuple[Index, NDArray[np.integer], Array]:
+def _parts(octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> Parts:
     places, shares = _across()
     lines = _Lines(octants, axis, places, regions_at, inside)
-    line, low, high, region = _pieces(lines, len(axis) * len(places))
+    (line, low, high, region), (crossing, at) = _pieces(lines, len(axis) * len(places))
     octant, number = np.divmod(line, len(places))
     weights = _integrals(octants.octant[octant], axis[octant], places[number], low, high)
     pairs = np.stack([octant, region], axis=1)
     key, where = np.unique(pairs, axis=0, return_inverse=True)
     summed = np.zeros((len(key), POINTS))
     np.add.at(summed, where.ravel(), shares[number, None] * weights)
-    return key[:, 0], key[:, 1], summed
+    border = lines.points(crossing, at)
+    return Parts(key[:, 0], key[:, 1], summed, crossing // len(places), border)
 
 
 @dataclass(frozen=True)
@@ -163,8 +178,12 @@ def _bisected(same: Callable[[Array], Flags], low: Array, high: Array, steps: in
     return 0.5 * (low + high)
 
 
-def _pieces(lines: _Lines, count: int) -> tuple[Index, Array, Array, NDArray[np.int64]]:
-    """Pieces of lines, each of one region: line, begin and end from 0 to 1, and region."""
+Pieces = tuple[Index, Array, Array, NDArray[np.int64]]
+"""Lines, begins and ends from 0 to 1, and regions of pieces."""
+
+
+def _pieces(lines: _Lines, count: int) -> tuple[Pieces, tuple[Index, Array]]:
+    """Pieces of lines, each of one region; lines that leave one for another, and where."""
     ends = np.linspace(0.0, 1.0, STEPS + 1)
     every = np.repeat(np.arange(count), STEPS + 1)
     inset = np.clip(ends, 1e-6, 1.0 - 1e-6)
@@ -177,6 +196,7 @@ def _pieces(lines: _Lines, count: int) -> tuple[Index, Array, Array, NDArray[np.
     border[within] = lines.border(number[within], low[within], high[within], left[within])
     out = ~within
     border[out] = lines.surface(number[out], low[out], high[out], left[out] >= 0)
+    crossings = number[within], border[within]
     # Begin and end of the pieces, line by line.
     line = np.concatenate([np.arange(count), number])
     begin = np.concatenate([np.zeros(count), border])
@@ -186,7 +206,7 @@ def _pieces(lines: _Lines, count: int) -> tuple[Index, Array, Array, NDArray[np.
     last = np.append(line[1:] != line[:-1], True)
     end = np.where(last, 1.0, np.append(begin[1:], 1.0))
     kept = (of >= 0) & (end > begin)
-    return line[kept], begin[kept], end[kept], of[kept]
+    return (line[kept], begin[kept], end[kept], of[kept]), crossings
 
 
 def _across() -> tuple[Array, Array]:

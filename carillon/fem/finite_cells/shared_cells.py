@@ -1,9 +1,7 @@
 """Finite cells whose inside is of several regions: each is integrated over its own part.
 
-A voxel may be of two regions, and be cut by the surface besides. Lines across it are divided where
-the region changes, which is found by bisection, so that regions need not follow the lattice.
-Displacements stay quadratic in the cell: where stiffness jumps, strains jump too, which one
-polynomial does not follow.
+A voxel may be of two regions, and be cut by the surface besides, so that regions need not follow
+the lattice; see `regions_of_cells`.
 """
 
 from __future__ import annotations
@@ -15,12 +13,9 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
 from carillon.fem.finite_cells.cells import FLOOR, FiniteCells
-from carillon.fem.finite_cells.region_lines import InsideAt, Octants, RegionsAt, parts_of_octants
+from carillon.fem.finite_cells.kinks import Borders, Kinks
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.regions import RegionOf, Regions
-
-SAMPLES = (0.02, 0.5, 0.98)
-"""Places along a voxel's edge at which regions are looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,44 +29,8 @@ class SharedCells:
     """(e,) what it is of."""
     weights: Array
     """(e, 125) integrals of the points' Lagrange polynomials over it, see `FiniteCells`."""
-
-
-def regions_of_cells(
-    cells: FiniteCells, regions_at: RegionsAt, inside: InsideAt
-) -> tuple[RegionOf, SharedCells | None, NDArray[np.bool_]]:
-    """Region (m,) that most of each voxel is of, parts of those that several share, and which (m,)
-    voxels are of none.
-
-    `inside` tells whether points (p, 3) [m] are inside the solid's surface.
-    """
-    cell, octant = np.nonzero(cells.voxels >= 0)
-    octants = Octants(cells, cell, octant)
-    offsets = np.array([[x, y, z] for z in SAMPLES for y in SAMPLES for x in SAMPLES])
-    seen = octants.sampled(offsets, regions_at)
-    cut = np.flatnonzero(octants.is_cut)
-    mixed = cut[_varies(seen[cut])]
-    if len(mixed):
-        is_inside = octants.some(mixed).sampled(offsets, inside).astype(bool)
-        left = np.where(is_inside, seen[mixed], -1)
-        # Too thin for the samples: all of them count.
-        seen[mixed] = np.where((left < 0).all(axis=1, keepdims=True), seen[mixed], left)
-    region = seen.max(axis=1)
-    split = np.flatnonzero(_varies(seen))
-    shared = None
-    if len(split):
-        shared = _split(octants.some(split), seen[split], regions_at, inside)
-        volume = np.zeros((len(cell), int(seen.max()) + 1))
-        row = np.zeros(cells.voxels.shape, dtype=np.int64)
-        row[cell, octant] = np.arange(len(cell))
-        np.add.at(volume, (row[shared.cell, shared.octant], shared.region), shared.weights.sum(1))
-        region[split] = volume[split].argmax(axis=1)
-    # A voxel's octants, of a divided cell, are all in it: the largest decides.
-    share = cells.fractions[cell, octant]
-    order = np.argsort(share, kind="stable")
-    of_voxel = np.full(cells.mesh.n_cells, -1)
-    of_voxel[cells.voxels[cell, octant][order]] = region[order]
-    nowhere = of_voxel < 0
-    return np.maximum(of_voxel, 0).astype(np.uint16), shared, nowhere
+    borders: Borders
+    """Where two regions meet in a cell."""
 
 
 def point_values(
@@ -160,45 +119,28 @@ def _slots(
     return law.astype(np.uint16), slot
 
 
-def _varies(seen: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether samples (k, p) are of several regions, those of none aside."""
-    most = seen.max(axis=1)
-    return np.asarray((np.where(seen < 0, most[:, None], seen) != most[:, None]).any(axis=1))
+def side_moduli(borders: Borders, cell: Index, law: RegionOf, young: Array) -> Array:
+    """Those (k, 2, 125) of `young` (k, s, 125) that belong to the two sides of borders.
+
+    `law` (k, s) are the regions of cells, `cell` (k,) the numbers of their borders.
+    """
+    slot = (law[:, None] == borders.region[cell][:, :, None]).argmax(axis=2)
+    return np.take_along_axis(young, slot[:, :, None], axis=1)
 
 
-def _most(row: NDArray[np.int64]) -> int:
-    """The region that most samples (p,) are of; -1 if there is none."""
-    there = row[row >= 0]
-    return int(np.bincount(there).argmax()) if len(there) else -1
-
-
-def _split(
-    octants: Octants, seen: NDArray[np.int64], regions_at: RegionsAt, inside: InsideAt
-) -> SharedCells:
-    """Parts of octants; what the lines miss is of the largest part, or of the commonest sample."""
-    row, region, weights = parts_of_octants(octants, _axes_across(seen), regions_at, inside)
-    exact = octants.weights
-    found = np.zeros_like(exact)
-    np.add.at(found, row, weights)
-    largest = np.full(len(exact), -1)
-    order = np.argsort(weights.sum(axis=1), kind="stable")
-    largest[row[order]] = order
-    missed = np.flatnonzero(largest < 0)
-    if len(missed):  # slivers between the lines
-        largest[missed] = len(row) + np.arange(len(missed))
-        most = [_most(samples) for samples in seen[missed]]
-        row, region = np.append(row, missed), np.append(region, most)
-        weights = np.concatenate([weights, np.zeros((len(missed), POINTS))])
-    weights[largest] += exact - found
-    return SharedCells(octants.cell[row], octants.octant[row], region.astype(np.uint16), weights)
-
-
-def _axes_across(seen: NDArray[np.int64]) -> Index:
-    """Axis (k,) along which regions change most often between samples (k, 27)."""
-    cube = seen.reshape(-1, 3, 3, 3)
-    counts = []
-    for axis in (3, 2, 1):
-        low, high = (np.take(cube, places, axis=axis) for places in ([0, 1], [1, 2]))
-        changes = (low != high) & (low >= 0) & (high >= 0)
-        counts.append(changes.sum(axis=(1, 2, 3)))
-    return np.asarray(np.stack(counts, axis=1).argmax(axis=1))
+def kinks_of(
+    cells: FiniteCells, regions: Regions, region: RegionOf, shared: SharedCells
+) -> Kinks | None:
+    """Kinks of cells at borders, by the materials as they are in tables; None if there are none."""
+    borders = shared.borders
+    if not len(borders):
+        return None
+    every = np.arange(len(borders))
+    tables = point_moduli(cells, regions, region, shared, regions.young[region])
+    ones = np.ones(cells.mesh.n_cells), np.ones(len(shared.cell))
+    volumes, law = point_values(cells, region, shared, *ones)
+    moduli, inside = (
+        side_moduli(borders, every, law[borders.cell], values[borders.cell])
+        for values in (tables[0], volumes)
+    )
+    return Kinks.in_equilibrium(borders, regions, moduli, inside)
