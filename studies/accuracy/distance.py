@@ -8,25 +8,18 @@ from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
-from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import load_surface, surface_name
 from carillon.fem.geometry.builtin import BUILTINS, THIN, TRIALS
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import RIGID_MODES
 from carillon.parameters import option, parameters
-from solver.accuracy.estimate import estimate_cell_errors
-from solver.accuracy.solving import AccuracyRequest, Solved, solve_solid
-from solver.analysis.modal_solver import modal_analysis
-from solver.analysis.modes import Modes
-from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.refinement.errors import FROM_SOLID
-from solver.refinement.inverse_iteration import FineStart
 from solver.verification.matching import frequency_errors
+from studies.accuracy.expected import elastic_hertz, expected_errors, solved_solid
 from studies.accuracy.solids import ANGLES
 
 ELASTIC = 30
@@ -97,15 +90,12 @@ def _meshes(objects: tuple[str, ...], turned: bool, folder: Path) -> Iterator[tu
 def _measured(name: str, mesh: str, options: DistanceStudyOptions) -> dict[str, Any]:
     described = ProblemOptions(mesh, options.resolution, discretisation="finite-cell")
     try:
-        truth = _solved(replace(described, resolution=options.reference), REFERENCE)
+        truth = solved_solid(replace(described, resolution=options.reference), MODES, REFERENCE)
     except (UserError, ConvergenceError) as error:
         return {"solid": name, "problem": str(error), "ways": {}}
-    assert isinstance(truth.model, FiniteCellModel)
-    vectors = truth.modes.system.gather(truth.modes.vectors)
-    assert vectors is not None
-    left = estimate_cell_errors(truth.model, truth.modes.values, vectors).errors.errors
+    left = expected_errors(truth)
     # Half of what the reference expects of itself is taken off, the other half is doubt.
-    hertz = _hertz(truth.modes) * (1.0 - 0.5 * left)
+    hertz = elastic_hertz(truth, ELASTIC) * (1.0 - 0.5 * left)
     truth.modes.destroy()
     ways = {way: _rated(described, way, hertz) for way in WAYS}
     reference = {"unknowns": truth.model.n_dofs, "doubt": 0.5 * float(np.sqrt(np.mean(left**2)))}
@@ -115,32 +105,17 @@ def _measured(name: str, mesh: str, options: DistanceStudyOptions) -> dict[str, 
 def _rated(described: ProblemOptions, way: str, hertz: Array) -> dict[str, Any]:
     discretisation, refine_to = WAYS[way]
     try:
-        solved = _solved(replace(described, discretisation=discretisation), refine_to)
+        solved = solved_solid(replace(described, discretisation=discretisation), MODES, refine_to)
     except (UserError, ConvergenceError) as error:
         return {"problem": str(error)}
     assert solved.model is not None
-    true = frequency_errors(_hertz(solved.modes) / hertz - 1.0, MODES).rms
+    true = frequency_errors(elastic_hertz(solved, ELASTIC) / hertz - 1.0, MODES).rms
     solved.modes.destroy()
     return {
         "unknowns": solved.model.n_dofs,
         "rms": true,
         "expected": solved.achieved.get(f"{FROM_SOLID}_rms"),
     }
-
-
-def _solved(described: ProblemOptions, refine_to: float | None) -> Solved:
-    def solve(
-        model: Solid | None, modes: int | None = None, start: FineStart | None = None
-    ) -> Modes:
-        asked = SolverOptions(modes=MODES if modes is None else min(modes, MODES))
-        return modal_analysis(model, asked, MPI.COMM_SELF)
-
-    request = AccuracyRequest(refine_to=refine_to, estimated=True)
-    return solve_solid(described, solve, SolverOptions(modes=MODES), request, MPI.COMM_SELF)
-
-
-def _hertz(modes: Modes) -> Array:
-    return np.asarray(np.sqrt(np.maximum(modes.values[RIGID_MODES:MODES], 0.0)) / (2.0 * np.pi))
 
 
 def _right(solids: list[dict[str, Any]], way: str) -> dict[str, int]:
