@@ -93,6 +93,7 @@ def _measured(name: str, mesh: str, options: DistanceStudyOptions) -> dict[str, 
         truth = solved_solid(replace(described, resolution=options.reference), MODES, REFERENCE)
     except (UserError, ConvergenceError) as error:
         return {"solid": name, "problem": str(error), "ways": {}}
+    assert truth.model is not None
     left = expected_errors(truth)
     # Half of what the reference expects of itself is taken off, the other half is doubt.
     hertz = elastic_hertz(truth, ELASTIC) * (1.0 - 0.5 * left)

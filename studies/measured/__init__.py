@@ -10,4 +10,8 @@ COMMANDS = {
         "errors against measured and published frequencies, beside those that are expected",
         room="solver",
     ),
+    "fit-constants": Command(
+        "studies.measured.fit_command",
+        "elastic constants of a measured solid from its frequencies, without a mesh",
+    ),
 }

@@ -14,7 +14,7 @@ STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Fit:
+class ConstantsFit:
     """A solid with the constants that its frequencies ask for."""
 
     solid: MeasuredSolid
@@ -27,7 +27,7 @@ class Fit:
         return float(np.sqrt(np.nanmean(self.errors**2)))
 
 
-def fitted(solid: MeasuredSolid, fewer: int = 0) -> Fit:
+def fitted(solid: MeasuredSolid, fewer: int = 0) -> ConstantsFit:
     """Fit all elastic constants, and how a crystal is turned if it is, from those that it has.
 
     Frequencies are matched by index, and a start that is far off ends elsewhere. `fewer` lowers the
@@ -42,7 +42,7 @@ def fitted(solid: MeasuredSolid, fewer: int = 0) -> Fit:
 
     known = np.isfinite(solid.hertz)
     found = least_squares(lambda values: errors(values)[known], np.ones_like(start), diff_step=STEP)
-    return Fit(_with(solid, names, found.x * start), errors(found.x))
+    return ConstantsFit(_with(solid, names, found.x * start), errors(found.x))
 
 
 def _constants(solid: MeasuredSolid) -> tuple[list[str], Array]:
@@ -67,7 +67,7 @@ def _with(solid: MeasuredSolid, names: list[str], values: Array) -> MeasuredSoli
     return replace(solid, material=changed)
 
 
-def as_text(fit: Fit) -> str:
+def as_text(fit: ConstantsFit) -> str:
     """Constants, and the errors that they leave."""
     material = fit.solid.material
     if material.elastic is None:

@@ -17,7 +17,7 @@ from carillon.parameters.quantities import between
 from solver.analysis.problem import ProblemOptions
 from solver.refinement.errors import FROM_SOLID
 from studies.accuracy.expected import elastic_hertz, expected_errors, solved_solid
-from studies.measured.solid import MeasuredSolid, read_solid, solid_names
+from studies.measured.solid import MeasuredSolid, is_file, read_solid, solid_names
 from studies.measured.verdict import verdict
 
 WITHOUT, CELLS, VOXELS = "without", "finite-cell", "voxel"
@@ -27,12 +27,13 @@ LOWER = 2
 
 
 def names_of_solids(text: str) -> tuple[str, ...]:
-    """Names of solids, joined by commas."""
+    """Names of solids, or paths of data files of others, joined by commas."""
     names, known = tuple(dict.fromkeys(text.split(","))), solid_names()
-    unknown = [name for name in names if name not in known]
+    unknown = [name for name in names if name not in known and not is_file(name)]
     if unknown:
         raise ArgumentTypeError(
-            f"{unknown[0]!r} is unknown, expected some of {', '.join(known)}, joined by commas"
+            f"{unknown[0]!r} is unknown, expected some of {', '.join(known)}, joined by "
+            "commas, or data files (.yaml)"
         )
     return names
 
@@ -43,7 +44,7 @@ class MeasuredOptions:
 
     solids: tuple[str, ...] = option(
         (),
-        "solids, joined by commas (default: all data files)",
+        "solids of the study or data files of others, joined by commas (default: all of the study)",
         read=names_of_solids,
         metavar="NAMES",
     )
@@ -61,10 +62,12 @@ def measure_solids(options: MeasuredOptions) -> dict[str, Any]:
     Returns plain values: `solids`, see `measured`, and the options.
     """
     names = options.solids or tuple(solid_names())
+    # What is wrong with a file is told before anything is computed.
+    solids = {Path(name).stem: read_solid(name) for name in names}
     return {
         "finer": options.finer,
         "refine_to": options.refine_to,
-        "solids": [measured(name, read_solid(name), options) for name in track(names, "solids")],
+        "solids": [measured(*each, options) for each in track(list(solids.items()), "solids")],
     }
 
 

@@ -11,10 +11,12 @@ UNITS = {
     "frequency": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
 }
 """Units by what they measure, as multiples of those of the SI."""
+LEAST = {"pressure": 1e5, "density": 1.0}
+"""Magnitudes from which a number without a unit is taken for one in the SI's: no solid has less."""
 
 
 def value_in(kind: str, text: object) -> float:
-    """The number of a text with a unit of some kind, in the SI's; a number is in them already.
+    """The number of a text with a unit of some kind, in the SI's; a large number has them already.
 
     Raises ValueError with what is wrong.
 
@@ -23,7 +25,7 @@ def value_in(kind: str, text: object) -> float:
     >>> value_in("pressure", "118.57 GPa")
     118570000000.0
     """
-    if isinstance(text, float | int):
+    if isinstance(text, float | int) and (text == 0.0 or abs(text) >= LEAST[kind]):
         return float(text)
     number, _, unit = str(text).partition(" ")
     try:

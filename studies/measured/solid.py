@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from carillon.arrays import Array, Surface
+from carillon.errors import UserError
 from carillon.fem.element import elasticity_matrix
 from carillon.fem.model import RIGID_MODES
 from carillon.parameters import REQUIRED, OneOf, option, parameters
@@ -33,7 +34,7 @@ FREE = "free"
 
 
 @parameters
-class Shape:
+class SolidGeometry:
     """What the solid looks like."""
 
     shape: Annotated[str, OneOf(*SHAPES)] = option(REQUIRED, "a function of `shapes.py`")
@@ -74,14 +75,12 @@ class Crystal:
 
 
 @parameters
-class Material:
+class SolidMaterial:
     """Constants of the solid."""
 
     _: KW_ONLY
-    density: Annotated[MassDensity, between(1.0, 1e5)] = option(REQUIRED, "with its unit")
-    young: Annotated[Pressure, between(1e5, 1e13)] | None = option(
-        None, "with its unit; null if not isotropic"
-    )
+    density: MassDensity = option(REQUIRED, "with its unit")
+    young: Pressure | None = option(None, "with its unit; null if not isotropic")
     poisson: PoissonRatio | None = option(None)
     elastic: Crystal | None = option(None, "elastic constants of a solid that is not isotropic")
     constants: str = option(REQUIRED, "who found the constants, and from what")
@@ -134,7 +133,7 @@ class Frequencies:
 
 
 @parameters
-class Source:
+class CitedSource:
     """What is cited."""
 
     reference: str = option(REQUIRED, "in full")
@@ -148,10 +147,10 @@ class MeasuredSolid:
     _: KW_ONLY
     title: str = option(REQUIRED, "name for people")
     kind: Annotated[str, OneOf("measured", "published")] = option(REQUIRED, "of the frequencies")
-    geometry: Shape = option(REQUIRED, "dimensions")
-    material: Material = option(REQUIRED, "constants")
+    geometry: SolidGeometry = option(REQUIRED, "dimensions")
+    material: SolidMaterial = option(REQUIRED, "constants")
     frequencies: Frequencies = option(REQUIRED, "what they are compared with")
-    source: Source = option(REQUIRED, "what is cited")
+    source: CitedSource = option(REQUIRED, "what is cited")
     conditions: str = option(REQUIRED, "how it was measured or computed")
     supports: str = option(FREE, "in words")
     left_out: str = option("", "why no model is made of it, if so")
@@ -200,6 +199,17 @@ def solid_names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.yaml"))
 
 
+def is_file(name: str) -> bool:
+    """Whether a name is the path of a data file elsewhere."""
+    return name.endswith(".yaml")
+
+
 def read_solid(name: str) -> MeasuredSolid:
-    """The solid of a data file of that name; raises UserError for anything wrong with it."""
-    return read_parameters(FOLDER / f"{name}.yaml", MeasuredSolid, "a measured solid")
+    """The solid of a name, or of a data file elsewhere.
+
+    Raises UserError if there is none, or for anything wrong with it.
+    """
+    if not is_file(name) and name not in solid_names():
+        raise UserError(f"there is no solid {name!r}, only {', '.join(solid_names())}")
+    path = Path(name) if is_file(name) else FOLDER / f"{name}.yaml"
+    return read_parameters(path, MeasuredSolid, "a measured solid")
