@@ -5,7 +5,7 @@ from typing import Annotated
 from annotated_types import Ge, Le
 
 from carillon.parameters import option, parameters
-from studies.measured.solid import solid_names
+from studies.measured.data_files import solid_names
 from workflow.configuration.resources import JobLimits
 from workflow.configuration.section import Several
 

@@ -17,7 +17,8 @@ from carillon.parameters.quantities import between
 from solver.analysis.problem import ProblemOptions
 from solver.refinement.errors import FROM_SOLID
 from studies.accuracy.expected import elastic_hertz, expected_errors, solved_solid
-from studies.measured.solid import MeasuredSolid, is_file, read_solid, solid_names
+from studies.measured.data_files import is_file, solid_names
+from studies.measured.solid import MeasuredSolid, read_solid
 from studies.measured.verdict import verdict
 
 WITHOUT, CELLS, VOXELS = "without", "finite-cell", "voxel"

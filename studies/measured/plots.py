@@ -15,7 +15,7 @@ COLUMNS = 2
 
 def errors_figure(study: MeasuredStudy) -> Figure:
     """Errors of every frequency, a panel a solid; the band is what the data are good for."""
-    rows = -(-len(study.rated) // COLUMNS)
+    rows = max(1, -(-len(study.rated) // COLUMNS))
     figure, panels = plt.subplots(rows, COLUMNS, figsize=(7.6, 0.8 + 1.7 * rows), squeeze=False)
     for panel, solid in zip(panels.flat, study.rated):
         given = np.array([np.nan if hertz is None else hertz for hertz in solid["hertz"]])

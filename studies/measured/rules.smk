@@ -1,11 +1,11 @@
 # Solids whose frequencies were measured or published: `snakemake measured`.
-from studies.measured import solid as measured_solid
+from studies.measured import data_files as measured_files
 from studies.measured import study as measured_study
 
 
 rule measure_measured_solids:
     input:
-        sorted(str(path) for path in measured_solid.FOLDER.glob("*.yaml")),
+        sorted(str(path) for path in measured_files.FOLDER.glob("*.yaml")),
     output:
         f"{place(measured_study.MEASURED)}/measured.json",
     log:

@@ -24,11 +24,10 @@ from studies.accuracy.anisotropic_box import box_eigenvalues
 from studies.accuracy.domains import Degrees
 from studies.accuracy.ritz import free_eigenvalues
 from studies.measured.crystals import SYMMETRIES, elasticity, turned
+from studies.measured.data_files import FOLDER, is_file, solid_names
 from studies.measured.quantities import UNITS, MassDensity, Pressure
 from studies.measured.shapes import DOMAINS, SHAPES, require_dimensions
 
-FOLDER = Path(__file__).with_name("data")
-"""Data files, one a solid; a file that is added is a solid that is measured."""
 FREE = "free"
 """Supports of a solid that has none."""
 
@@ -192,16 +191,6 @@ class MeasuredSolid:
     def _in_hertz(self, values: tuple[float | None, ...]) -> Array:
         unit = UNITS["frequency"][self.frequencies.unit]
         return np.array([np.nan if value is None else unit * value for value in values])
-
-
-def solid_names() -> list[str]:
-    """Names of all data files, in the order of the alphabet."""
-    return sorted(path.stem for path in FOLDER.glob("*.yaml"))
-
-
-def is_file(name: str) -> bool:
-    """Whether a name is the path of a data file elsewhere."""
-    return name.endswith(".yaml")
 
 
 def read_solid(name: str) -> MeasuredSolid:

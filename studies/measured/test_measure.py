@@ -15,9 +15,10 @@ from studies.accuracy.domains import cylinder
 from studies.accuracy.ritz import free_eigenvalues
 from studies.measured import fit_command
 from studies.measured.crystals import elasticity, turned
+from studies.measured.data_files import FOLDER, solid_names
 from studies.measured.fit import fitted
 from studies.measured.measure import WITHOUT, as_text, rated
-from studies.measured.solid import FOLDER, FREE, MeasuredSolid, read_solid, solid_names
+from studies.measured.solid import FREE, MeasuredSolid, read_solid
 from studies.measured.verdict import AGREES, DIFFERS, TOO_COARSE
 
 SOLIDS = {name: read_solid(name) for name in solid_names()}

@@ -7,9 +7,10 @@ import pytest
 import yaml
 
 from studies.measured.config import MeasuredSolidsSection
+from studies.measured.data_files import solid_names
 from studies.measured.measure import CELLS, VOXELS, WITHOUT, MeasuredOptions, measured, rated
 from studies.measured.results import MeasuredStudy
-from studies.measured.solid import read_solid, solid_names
+from studies.measured.solid import read_solid
 from studies.measured.study import MEASURED
 from studies.measured.verdict import DIFFERS
 from tests.pages import assert_holds, page_of
