@@ -1,8 +1,8 @@
-"""Frequencies of boxes of any elasticity by Rayleigh-Ritz with products of polynomials: no mesh.
+"""Frequencies of boxes of any elasticity, or of layers, by Rayleigh-Ritz with products: no mesh.
 
 It shares nothing with `studies.accuracy.ritz`: integrals over a box are products of integrals along
 its sides. Visscher et al. 1991 take powers of x, y and z; Legendre's polynomials span the same
-space and stay independent at high degrees.
+space and stay independent at high degrees. Along z, functions have kinks between layers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as la
 from numpy.polynomial import legendre
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from studies.accuracy.domains import Degrees, Sides
 
 ROWS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
@@ -30,6 +30,14 @@ class PointMass(NamedTuple):
     point: Sequence[float]
 
 
+class BoxLayer(NamedTuple):
+    """A layer of a box: its thickness along z [m], elasticity (6, 6) [Pa] and density [kg/m^3]."""
+
+    thickness: float
+    elasticity: Array
+    density: float
+
+
 def box_eigenvalues(
     sides: Sides,
     degrees: Degrees,
@@ -38,25 +46,16 @@ def box_eigenvalues(
     clamped: bool = False,
     masses: Sequence[PointMass] = (),
 ) -> Array:
-    """All eigenvalues [rad^2/s^2] of a box in a space of polynomials, those of rigid motions first.
-
-    They are bounds from above. The space holds the products of powers i, j, k with
-    ``i / I + j / J + k / K <= 1``, of a `clamped` box times the distance from the held face.
+    """All eigenvalues [rad^2/s^2] of a uniform box, see `layered_eigenvalues`.
 
     Parameters
     ----------
     sides
         Of the box [m].
-    degrees
-        I, J, K.
     elasticity
         (6, 6) [Pa], symmetric; engineering shear strains, in the order xx, yy, zz, xy, yz, zx.
     density
         Mass density [kg/m^3].
-    clamped
-        Whether the face of least z does not move.
-    masses
-        Points of the box that weigh something.
 
     Examples
     --------
@@ -65,39 +64,65 @@ def box_eigenvalues(
     >>> len(values), int(np.count_nonzero(values > 1.0))
     (105, 99)
     """
-    powers = np.array([p for p in np.ndindex(*np.add(degrees, 1)) if _within(p, degrees)]).T
-    lines = [
-        _Line.of(side, degree, held)
-        for side, degree, held in zip(sides, degrees, (False, False, clamped))
-    ]
+    x, y, z = sides
+    return layered_eigenvalues((x, y), degrees, [BoxLayer(z, elasticity, density)], clamped, masses)
 
-    def products(left: int | None, right: int | None) -> Array:
-        """Integrals (n, n) of all pairs of functions, of their derivatives along these axes."""
-        return np.prod(
-            [
-                line.integrals[int(left == axis)][int(right == axis)][np.ix_(index, index)]
-                for axis, (line, index) in enumerate(zip(lines, powers))
-            ],
-            axis=0,
-        )
 
+def layered_eigenvalues(
+    sides: tuple[float, float],
+    degrees: Degrees,
+    layers: Sequence[BoxLayer],
+    clamped: bool = False,
+    masses: Sequence[PointMass] = (),
+) -> Array:
+    """All eigenvalues [rad^2/s^2] of a box of layers, those of rigid motions first.
+
+    They are bounds from above, in a space of products of polynomials of degrees i, j, k with
+    ``i / I + j / J + k / K <= 1``; those along z are continuous, and polynomials in each layer.
+
+    Parameters
+    ----------
+    sides
+        Along x and y [m].
+    degrees
+        I, J, K.
+    layers
+        From the least z on.
+    clamped
+        Whether the face of least z does not move.
+    masses
+        Points of the box that weigh something.
+    """
+    (x, y), (i, j, k) = sides, degrees
+    lines = [_plain_line(x, i), _plain_line(y, j), _layered_line(layers, k, clamped)]
+    powers = _powers(lines, degrees)
     count = powers.shape[1]
-    forms = {pair: products(*pair) for pair in AXIS_PAIRS}
+
+    def products(left: int | None, right: int | None, layer: int) -> Array:
+        """Integrals (n, n) of all pairs of functions, of their derivatives along these axes."""
+        tables = [
+            line.integrals[int(left == axis), int(right == axis), layer if axis == 2 else 0]
+            for axis, line in enumerate(lines)
+        ]
+        return np.prod([t[np.ix_(p, p)] for t, p in zip(tables, powers)], axis=0)
+
     K = np.zeros((3, count, 3, count))
-    for i, j in AXIS_PAIRS:
+    M = np.zeros((count, count))
+    for number, layer in enumerate(layers):
         for a, b in AXIS_PAIRS:
-            K[i, :, j] += elasticity[ROWS[i, a], ROWS[j, b]] * forms[a, b]
-    scalar = density * products(None, None)
+            form = products(a, b, number)
+            for p, q in AXIS_PAIRS:
+                K[p, :, q] += layer.elasticity[ROWS[p, a], ROWS[q, b]] * form
+        M += layer.density * products(None, None, number)
     for mass, point in masses:
-        values = np.prod(
-            [line.values_at(x)[index] for line, x, index in zip(lines, point, powers)], axis=0
-        )
-        scalar += mass * np.outer(values, values)
+        values = [line.values_at(place) for line, place in zip(lines, point)]
+        at = np.prod([value[power] for value, power in zip(values, powers)], axis=0)
+        M += mass * np.outer(at, at)
     # In a basis that is orthonormal by the mass: the same for each displacement.
-    lower = la.cholesky(scalar, lower=True)
-    for i, j in AXIS_PAIRS:
-        half = la.solve_triangular(lower, K[i, :, j], lower=True)
-        K[i, :, j] = la.solve_triangular(lower, half.T, lower=True).T
+    lower = la.cholesky(M, lower=True)
+    for p, q in AXIS_PAIRS:
+        half = la.solve_triangular(lower, K[p, :, q], lower=True)
+        K[p, :, q] = la.solve_triangular(lower, half.T, lower=True).T
     return np.asarray(la.eigvalsh(K.reshape(3 * count, 3 * count)))
 
 
@@ -109,46 +134,82 @@ def box_frequencies(
     return np.asarray(np.sqrt(values[6 : 6 + count]) / (2.0 * np.pi))
 
 
-def _within(powers: Sequence[int], degrees: Degrees) -> bool:
-    return sum(power / degree for power, degree in zip(powers, degrees)) <= 1.0 + 1e-12
-
-
 class _Line(NamedTuple):
-    """Functions along one side, from -1 to 1: polynomials, times 1 + x if the side is `held`."""
+    """Functions along one side of the box, in parts."""
 
-    side: float
-    degree: int
-    held: bool
-    integrals: list[list[Array]]
-    """[a][b] (d + 1, d + 1): of products of functions (0) or derivatives (1) along the side [m]."""
+    ends: Array
+    """(p + 1,) of the parts, from the middle of the side [m]."""
+    tables: Array
+    """(p, d, n): Legendre's coefficients of each function in each part."""
+    degrees: Index
+    """(n,) of the functions, for the choice of products."""
+    integrals: Array
+    """[a, b] (2, 2, p, n, n): of products of functions (0) or derivatives (1) over each part."""
 
-    @classmethod
-    def of(cls, side: float, degree: int, held: bool) -> _Line:
-        x, weights = legendre.leggauss(degree + 2)
-        weights = 0.5 * side * weights
-        both = [_functions(x, degree, held), _slopes(x, degree, held) * (2.0 / side)]
-        integrals = [[(left.T * weights) @ right for right in both] for left in both]
-        return cls(side, degree, held, integrals)
-
-    def values_at(self, x: float) -> Array:
-        """Values (d + 1,) of the functions at a place from the middle [m]."""
-        return _functions(np.array([2.0 * x / self.side]), self.degree, self.held)[0]
+    def values_at(self, place: float) -> Array:
+        """Values (n,) of the functions at a place from the middle [m]."""
+        part = int(np.clip(np.searchsorted(self.ends, place) - 1, 0, len(self.tables) - 1))
+        start, end = self.ends[part], self.ends[part + 1]
+        inside = 2.0 * (place - start) / (end - start) - 1.0
+        return np.asarray(legendre.legval(inside, self.tables[part]))
 
 
-def _functions(x: Array, degree: int, held: bool) -> Array:
-    values = _legendre(x, degree)
-    return (1.0 + x)[:, None] * values if held else values
+def _line(ends: Array, tables: Array, degrees: Index) -> _Line:
+    x, weights = legendre.leggauss(tables.shape[1] + 1)
+    halves = 0.5 * np.diff(ends)
+    slopes = np.stack([legendre.legder(table, axis=0) for table in tables])
+    both = [
+        np.stack([legendre.legval(x, part) / half**order for part, half in zip(parts, halves)])
+        for order, parts in enumerate((tables, slopes))
+    ]
+    integrals = np.array(
+        [
+            [np.einsum("p,q,pmq,pnq->pmn", halves, weights, left, right) for right in both]
+            for left in both
+        ]
+    )
+    return _Line(ends, tables, degrees, integrals)
 
 
-def _slopes(x: Array, degree: int, held: bool) -> Array:
-    slopes = legendre.legval(x, legendre.legder(np.diag(_norms(degree)), axis=0)).T
-    return (1.0 + x)[:, None] * slopes + _legendre(x, degree) if held else np.asarray(slopes)
+def _plain_line(side: float, degree: int) -> _Line:
+    """Legendre's polynomials, normalised."""
+    numbers = np.arange(degree + 1)
+    tables = np.diag(np.sqrt((2.0 * numbers + 1.0) / side))[None]
+    return _line(np.array([-0.5, 0.5]) * side, tables, numbers)
 
 
-def _legendre(x: Array, degree: int) -> Array:
-    """Values (q, d + 1) of Legendre's polynomials, normalised over -1 to 1."""
-    return np.asarray(legendre.legvander(x, degree) * _norms(degree))
+def _layered_line(layers: Sequence[BoxLayer], degree: int, clamped: bool) -> _Line:
+    """Continuous functions that are polynomials in each layer.
+
+    One, ramps that rise from 0 to 1 in one layer and fall in the next, and bubbles of degree 2 and
+    more that vanish outside of their layer. Without the one, all vanish where the first layer
+    begins; they count as lower by a degree, as a factor that vanishes there is no choice.
+    """
+    ends = np.concatenate([[0.0], np.cumsum([layer.thickness for layer in layers])])
+    parts = len(layers)
+    tables, numbers = [], []
+
+    def add(number: int, *shares: tuple[int, dict[int, float]]) -> None:
+        table = np.zeros((parts, degree + 1 + clamped))
+        for part, coefficients in shares:
+            table[part, list(coefficients)] = list(coefficients.values())
+        tables.append(table)
+        numbers.append(number - clamped)
+
+    if not clamped:
+        add(0, *((part, {0: 1.0}) for part in range(parts)))
+    for part in range(parts):
+        falls = [(part + 1, {0: 0.5, 1: -0.5})] if part + 1 < parts else []
+        add(1, (part, {0: 0.5, 1: 0.5}), *falls)
+        for power in range(2, degree + 1 + clamped):
+            size = 1.0 / np.sqrt(4.0 * power - 2.0)
+            add(power, (part, {power: size, power - 2: -size}))
+    middle = 0.5 * ends[-1]
+    return _line(ends - middle, np.stack(tables, axis=-1), np.array(numbers))
 
 
-def _norms(degree: int) -> Array:
-    return np.sqrt(np.arange(degree + 1) + 0.5)
+def _powers(lines: Sequence[_Line], degrees: Degrees) -> Index:
+    """Numbers (3, n) of the functions along each side that the products consist of."""
+    shares = [line.degrees / degree for line, degree in zip(lines, degrees)]
+    total = shares[0][:, None, None] + shares[1][:, None] + shares[2]
+    return np.array(np.nonzero(total <= 1.0 + 1e-12))

@@ -5,8 +5,22 @@ import pytest
 
 from carillon.fem.element import elasticity_matrix
 from studies.accuracy import domains
-from studies.accuracy.anisotropic_box import PointMass, box_eigenvalues, box_frequencies
-from studies.accuracy.beams import BeamPart, bending_frequencies, timoshenko_cantilever
+from studies.accuracy.anisotropic_box import (
+    BoxLayer,
+    PointMass,
+    box_eigenvalues,
+    box_frequencies,
+    layered_eigenvalues,
+)
+from studies.accuracy.beams import (
+    BeamPart,
+    Layer,
+    RodPart,
+    bending_frequencies,
+    layered,
+    rod_frequencies,
+    timoshenko_cantilever,
+)
 from studies.accuracy.ritz import free_eigenvalues
 
 SIDES, DEGREES, DENSITY = (0.03, 0.04, 0.05), (7, 7, 7), 2000.0
@@ -102,3 +116,57 @@ def test_a_rigid_motion_of_a_free_box_takes_its_masses_along():
     free = box_eigenvalues(SIDES, DEGREES, triclinic(4), DENSITY)
     assert np.abs(values[:6]).max() < 1e-8 * values[6]
     assert (hertz(values) <= hertz(free) * (1.0 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("clamped", [False, True])
+def test_a_cut_between_layers_that_are_alike_changes_nothing(clamped):
+    x, y, z = SIDES
+    elasticity = triclinic(5)
+    layers = [BoxLayer(share * z, elasticity, DENSITY) for share in (0.3, 0.7)]
+    whole = box_eigenvalues(SIDES, (9, 9, 9), elasticity, DENSITY, clamped)
+    cut = layered_eigenvalues((x, y), (9, 9, 9), layers, clamped)
+    first = slice(0 if clamped else 6, 16)
+    assert np.allclose(cut[first], whole[first], rtol=2e-3)
+    assert (cut[first] <= whole[first] * (1.0 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("clamped", [False, True])
+def test_two_materials_along_a_rod_are_those_of_its_equation(clamped):
+    """Without Poisson's contraction sections move as one, and the rod's equation is exact."""
+    constants = [(0.4, 1e9, 1000.0), (0.6, 5e9, 3000.0)]
+    layers = [BoxLayer(z, young * elasticity_matrix(0.0), rho) for z, young, rho in constants]
+    values = layered_eigenvalues((0.02, 0.03), (3, 3, 10), layers, clamped)
+    found = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
+    exact = rod_frequencies(*(RodPart(*each) for each in constants), 3, clamped)
+    assert all(np.abs(found / hertz - 1.0).min() < 1e-6 for hertz in exact)
+
+
+@pytest.mark.parametrize("clamped", [False, True])
+def test_two_materials_along_a_bar_bend_as_a_beam_of_two_parts(clamped):
+    side = 0.01
+    constants = [(0.4, 1e9, 1000.0), (0.6, 5e9, 3000.0)]
+    layers = [BoxLayer(z, young * elasticity_matrix(0.0), rho) for z, young, rho in constants]
+    values = layered_eigenvalues((side, side), (3, 3, 12), layers, clamped)
+    parts = [
+        BeamPart(z, young * side**4 / 12.0, rho * side**2, 5.0 / 12.0 * young * side**2)
+        for z, young, rho in constants
+    ]
+    exact = np.repeat(bending_frequencies(parts, 2, clamped), 2)
+    first = 0 if clamped else 6
+    found = np.sqrt(values[first : first + 4]) / (2.0 * np.pi)
+    assert np.allclose(found, exact, rtol=2e-3)
+
+
+def test_two_layers_across_a_bar_bend_as_a_bimetal_strip():
+    """A little lower, as Euler's and Bernoulli's beams do not shear."""
+    length, width = 1.0, 0.02
+    strip = [Layer(0.006, 2e9, 3000.0), Layer(0.010, 7e8, 900.0)]
+    layers = [
+        BoxLayer(layer.thickness, layer.young * elasticity_matrix(0.0), layer.density)
+        for layer in strip
+    ]
+    values = layered_eigenvalues((length, width), (14, 4, 3), layers)
+    found = np.sqrt(values[6:20]) / (2.0 * np.pi)
+    for hertz in bending_frequencies([layered(strip, width, length)], 2):
+        lower = 1.0 - found[np.abs(found / hertz - 1.0).argmin()] / hertz
+        assert 0.0 < lower < 3e-3

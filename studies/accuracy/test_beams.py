@@ -15,8 +15,6 @@ from studies.accuracy.beams import (
     rod_frequencies,
     timoshenko_cantilever,
 )
-from studies.accuracy.domains import Domain, box
-from studies.accuracy.ritz import free_eigenvalues
 from tests import solids, theories
 
 SOFT, STIFF = RodPart(0.4, 1e9, 1000.0), RodPart(0.6, 4e9, 1500.0)
@@ -112,19 +110,3 @@ def test_two_layers_bend_as_timoshenkos_thermostat():
     joint = e * a * f * b * (a + b) ** 2 / (4.0 * (e * a + f * b))
     assert strip.bending == pytest.approx(width * (own + joint))
     assert strip.mass == pytest.approx(width * (7800.0 * a + 2700.0 * b))
-
-
-def test_a_bar_of_two_moduli_agrees_with_the_solid():
-    """Without Poisson's contraction, and slender; each half has points of its own."""
-    degrees, sides = (32, 2, 2), (1.0, 0.03, 0.02)
-    half = box((0.5, 0.03, 0.02), degrees)
-    points = np.concatenate([half.points + np.array([x, 0.0, 0.0]) for x in (-0.25, 0.25)])
-    domain = Domain(points, np.tile(half.weights, 2), sides)
-    young = np.where(points[:, 0] < 0.0, 1e9, 1.5e9)
-    values = free_eigenvalues(domain, degrees, young, 0.0, 1000.0)[6:40]
-    found = np.sqrt(values) / (2.0 * np.pi)
-    area, moment = sides[1] * sides[2], sides[1] * sides[2] ** 3 / 12.0
-    parts = [BeamPart(0.5, each * moment, 1000.0 * area) for each in (1e9, 1.5e9)]
-    rods = [RodPart(0.5, each, 1000.0) for each in (1e9, 1.5e9)]
-    for exact in (*bending_frequencies(parts, 3), *rod_frequencies(*rods, 1)):
-        assert np.abs(found / exact - 1.0).min() < 5e-3
