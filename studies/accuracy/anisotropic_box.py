@@ -59,7 +59,7 @@ def box_eigenvalues(
 
     Examples
     --------
-    >>> from carillon.fem.element import elasticity_matrix
+    >>> from carillon.fem.elasticity import elasticity_matrix
     >>> values = box_eigenvalues((0.1, 0.1, 0.1), (4, 4, 4), 1e9 * elasticity_matrix(), 1000.0)
     >>> len(values), int(np.count_nonzero(values > 1.0))
     (105, 99)

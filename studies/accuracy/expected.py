@@ -5,7 +5,7 @@ from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.solving import AccuracyRequest, Solved, solve_solid
 from solver.analysis.modal_solver import modal_analysis
@@ -33,7 +33,8 @@ def solved_solid(described: ProblemOptions, modes: int, refine_to: float | None)
 
 def elastic_hertz(solved: Solved, count: int) -> Array:
     """The lowest elastic frequencies (count,) [Hz]."""
-    values = solved.modes.values[RIGID_MODES : RIGID_MODES + count]
+    rigid = solved.modes.rigid
+    values = solved.modes.values[rigid : rigid + count]
     return np.asarray(np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from carillon.fem.element import elasticity_matrix
+from carillon.fem.elasticity import elasticity_matrix
 from studies.accuracy import domains
 from studies.accuracy.anisotropic_box import (
     BoxLayer,

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import yaml
 
 from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError, UserError
-from carillon.fem.materials import UNIFORM_YOUNG
 from carillon.fem.model import RIGID_MODES
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
@@ -113,19 +113,14 @@ def _meshed(
     resolution = max(2, round(options.finer * solid.resolution))
     start = {"model": kind, "resolution": resolution}
     count = len(solid.hertz)
-    assert solid.material.isotropic is not None
-    young, poisson = solid.material.isotropic
-    # Of a longest side of 1 m, whatever the size.
+    # In units of the longest side, as a mesh file without one.
     surface = solid.geometry.surface()
-    scale = float(1.0 / surface.extents.max())
-    path = folder / "solid.stl"
-    surface.apply_scale(scale).export(path)
+    unit = float(surface.extents.max())
+    mesh_file, regions = folder / "solid.stl", folder / "regions.yaml"
+    surface.apply_scale(1.0 / unit).export(mesh_file)
+    regions.write_text(yaml.safe_dump(solid.composition))
     described = ProblemOptions(
-        str(path),
-        resolution,
-        discretisation=kind,
-        poisson=poisson,
-        density=solid.material.density,
+        str(mesh_file), resolution, discretisation=kind, unit=unit, regions=str(regions)
     )
     refine_to = options.refine_to if kind == CELLS else None
     try:
@@ -133,7 +128,7 @@ def _meshed(
     except (UserError, ConvergenceError) as error:
         return {**start, "problem": str(error)}
     assert solved.model is not None
-    found = elastic_hertz(solved, count) * scale * np.sqrt(young / UNIFORM_YOUNG)
+    found = elastic_hertz(solved, count)
     errors = expected_errors(solved) if kind == CELLS else None
     mesh = solved.achieved.get(f"{FROM_SOLID}_rms")
     start["unknowns"] = solved.model.n_dofs

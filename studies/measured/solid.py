@@ -3,16 +3,17 @@
 from dataclasses import KW_ONLY
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from carillon.arrays import Array, Surface
+from carillon.composition.entries import SupportEntry
 from carillon.errors import UserError
-from carillon.fem.element import elasticity_matrix
+from carillon.fem.elasticity import elasticity_matrix
 from carillon.fem.model import RIGID_MODES
 from carillon.parameters import REQUIRED, OneOf, option, parameters
-from carillon.parameters.documents import read_parameters
+from carillon.parameters.documents import document_of, read_parameters
 from carillon.parameters.quantities import (
     PoissonRatio,
     Positive,
@@ -23,7 +24,7 @@ from carillon.parameters.quantities import (
 from studies.accuracy.anisotropic_box import box_eigenvalues
 from studies.accuracy.domains import Degrees
 from studies.accuracy.ritz import free_eigenvalues
-from studies.measured.crystals import SYMMETRIES, elasticity, turned
+from studies.measured.crystals import SYMMETRIES, elasticity, grain, turned
 from studies.measured.data_files import FOLDER, is_file, solid_names
 from studies.measured.quantities import UNITS, MassDensity, Pressure
 from studies.measured.shapes import DOMAINS, SHAPES, require_dimensions
@@ -152,6 +153,9 @@ class MeasuredSolid:
     source: CitedSource = option(REQUIRED, "what is cited")
     conditions: str = option(REQUIRED, "how it was measured or computed")
     supports: str = option(FREE, "in words")
+    held: tuple[SupportEntry, ...] = option(
+        (), "the same as regions files have it, in metres of the solid's shape"
+    )
     left_out: str = option("", "why no model is made of it, if so")
     resolution: Resolution = option(24)
     degrees: Triple[Annotated[int, between(4, 40)]] | None = option(
@@ -166,6 +170,20 @@ class MeasuredSolid:
     def others_hertz(self, name: str) -> Array:
         """Frequencies (n,) [Hz] by others, likewise."""
         return self._in_hertz(self.frequencies.others[name])
+
+    @property
+    def composition(self) -> dict[str, Any]:
+        """Plain values of the file that `carillon modes --regions` takes."""
+        material = self.material
+        region: dict[str, Any] = {"name": "solid", "density": material.density}
+        if material.isotropic is not None:
+            young, poisson = material.isotropic
+            region |= {"young": young, "poisson": poisson}
+        else:
+            assert material.elastic is not None
+            crystal = elasticity(material.elastic.symmetry, material.elastic.constants)
+            region |= grain(crystal, material.elastic.turned)
+        return {"regions": [region], "supports": [document_of(each) for each in self.held]}
 
     @property
     def is_run(self) -> bool:
