@@ -73,8 +73,8 @@ class Octants:
 
 
 @dataclass(frozen=True)
-class Parts:
-    """Parts of octants by region."""
+class OctantParts:
+    """OctantParts of octants by region."""
 
     octant: Index
     region: NDArray[np.integer]
@@ -85,7 +85,7 @@ class Parts:
     """(b,), (b, 3) [m] where lines leave one region for another."""
 
     @classmethod
-    def nothing(cls) -> Parts:
+    def nothing(cls) -> OctantParts:
         """No parts."""
         none = np.empty(0, dtype=np.int64)
         return cls(none, none, np.empty((0, POINTS)), none, np.empty((0, 3)))
@@ -93,8 +93,8 @@ class Parts:
 
 def parts_of_octants(
     octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt
-) -> Parts:
-    """Parts of octants that lines across them along `axis` (k,) find."""
+) -> OctantParts:
+    """OctantParts of octants that lines across them along `axis` (k,) find."""
     found = []
     # A few octants at a time, each with all of its lines.
     step = max(1, AT_ONCE // (len(_across()[0]) * (STEPS + 1)))
@@ -103,10 +103,10 @@ def parts_of_octants(
         parts = _parts(octants.some(few), axis[few], regions_at, inside)
         rows = few[parts.octant], parts.region, parts.weights
         found.append((*rows, few[parts.border_octant], parts.border))
-    return Parts(*(np.concatenate(each) for each in zip(*found, strict=True)))
+    return OctantParts(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
-def _parts(octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> Parts:
+def _parts(octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> OctantParts:
     places, shares = _across()
     lines = _Lines(octants, axis, places, regions_at, inside)
     (line, low, high, region), (crossing, at) = _pieces(lines, len(axis) * len(places))
@@ -117,7 +117,7 @@ def _parts(octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideA
     summed = np.zeros((len(key), POINTS))
     np.add.at(summed, where.ravel(), shares[number, None] * weights)
     border = lines.points(crossing, at)
-    return Parts(key[:, 0], key[:, 1], summed, crossing // len(places), border)
+    return OctantParts(key[:, 0], key[:, 1], summed, crossing // len(places), border)
 
 
 @dataclass(frozen=True)

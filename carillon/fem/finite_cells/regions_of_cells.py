@@ -14,8 +14,8 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.kinks import SMALLEST, Borders
 from carillon.fem.finite_cells.region_lines import (
     InsideAt,
+    OctantParts,
     Octants,
-    Parts,
     RegionsAt,
     parts_of_octants,
 )
@@ -43,7 +43,7 @@ def regions_of_cells(
     seen = _seen(octants, regions_at, inside)
     region = seen.max(axis=1)
     split = np.flatnonzero(_varies(seen))
-    parts = Parts.nothing()
+    parts = OctantParts.nothing()
     if len(split):
         some = octants.some(split)
         parts = _complete(
@@ -97,7 +97,7 @@ def _most(row: NDArray[np.int64]) -> int:
     return int(np.bincount(there).argmax()) if len(there) else -1
 
 
-def _complete(parts: Parts, exact: Array, seen: NDArray[np.int64]) -> Parts:
+def _complete(parts: OctantParts, exact: Array, seen: NDArray[np.int64]) -> OctantParts:
     """The parts with what lines miss of the weights (k, 125) of octants, in the largest part.
 
     Octants that lines find nothing of are of the commonest sample's region.
@@ -115,7 +115,7 @@ def _complete(parts: Parts, exact: Array, seen: NDArray[np.int64]) -> Parts:
         row, region = np.append(row, missed), np.append(region, most)
         weights = np.concatenate([weights, np.zeros((len(missed), POINTS))])
     weights[largest] += exact - found
-    return Parts(row, region, weights, parts.border_octant, parts.border)
+    return OctantParts(row, region, weights, parts.border_octant, parts.border)
 
 
 def _axes_across(seen: NDArray[np.int64]) -> Index:
@@ -182,19 +182,23 @@ def _made_definite(cells: FiniteCells, region: RegionOf, shared: SharedCells) ->
     least = np.linalg.eigvalsh(inverse @ grams @ inverse.T)[:, 0].reshape(len(own), -1)
     row, slot = np.nonzero(least < -ROUNDING)
     lacks = -least[row, slot]
-    # Taken from the part that has most to spare, so that all together stays what it is.
+    # Moved from the part that has most to spare, so that all together stays what it is.
     spare = least.argmax(axis=1)[row]
     can = least[row, spare] > lacks
-    row, slot = np.append(row, row[can]), np.append(slot, spare[can])
-    cell, number = own[row], law[own[row], slot]
-    share = np.append(lacks, -lacks[can])
-    added = share[:, None] * octant_weights().sum(axis=0)
-    first = (cells.voxels[cell] >= 0).argmax(axis=1)
+    numbers = shared.region.copy()
+    for number in np.flatnonzero(~can):
+        # A sliver that no other part can mend is of that part.
+        cell = own[row[number]]
+        sliver = (shared.cell == cell) & (shared.region == law[cell, slot[number]])
+        numbers[sliver] = law[cell, spare[number]]
+    row, slot, spare, lacks = row[can], slot[can], spare[can], lacks[can]
+    cell = np.tile(own[row], 2)
+    share = np.append(lacks, -lacks)
     return SharedCells(
         np.append(shared.cell, cell),
-        np.append(shared.octant, first),
-        np.append(shared.region, number),
-        np.concatenate([shared.weights, added]),
+        np.append(shared.octant, (cells.voxels[cell] >= 0).argmax(axis=1)),
+        np.concatenate([numbers, law[own[row], slot], law[own[row], spare]]),
+        np.concatenate([shared.weights, share[:, None] * octant_weights().sum(axis=0)]),
         shared.borders,
     )
 
