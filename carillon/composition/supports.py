@@ -13,9 +13,10 @@ from carillon.errors import UserError
 from carillon.fem.model import Solid
 from carillon.fem.supports import Supports
 
-HELD = 1e5
+HELD = 1e3
 """Stiffness of the spring at a held point, in multiples of modulus times lattice spacing. What is
-held moves by a hundred thousandth of what one spacing of the solid is strained."""
+held moves by a thousandth of what one spacing of the solid is strained; stiffer ones, on cells of
+which little is inside, cost digits."""
 SAMPLE = 0.5
 """Largest edge of the triangles whose middles stand for a surface, in lattice spacings."""
 SLIGHT = 1e-6
