@@ -98,23 +98,22 @@ def _most(row: NDArray[np.int64]) -> int:
 
 
 def _complete(parts: OctantParts, exact: Array, seen: NDArray[np.int64]) -> OctantParts:
-    """The parts with what lines miss of the weights (k, 125) of octants, in the largest part.
+    """The parts with what lines miss of the weights (k, 125) of octants, in proportion to them.
 
-    Octants that lines find nothing of are of the commonest sample's region.
+    That is what octants have taken in from slight neighbours, and rounding. Octants that lines find
+    nothing of are of the commonest sample's region.
     """
     row, region, weights = parts.octant, parts.region, parts.weights
     found = np.zeros_like(exact)
     np.add.at(found, row, weights)
-    largest = np.full(len(exact), -1)
-    order = np.argsort(weights.sum(axis=1), kind="stable")
-    largest[row[order]] = order
-    missed = np.flatnonzero(largest < 0)
+    total = np.bincount(row, weights.sum(axis=1), minlength=len(exact))
+    share = weights.sum(axis=1) / np.where(total > 0.0, total, 1.0)[row]
+    weights = weights + share[:, None] * (exact - found)[row]
+    missed = np.flatnonzero(total == 0.0)
     if len(missed):  # slivers between the lines
-        largest[missed] = len(row) + np.arange(len(missed))
         most = [_most(samples) for samples in seen[missed]]
         row, region = np.append(row, missed), np.append(region, most)
-        weights = np.concatenate([weights, np.zeros((len(missed), POINTS))])
-    weights[largest] += exact - found
+        weights = np.concatenate([weights, exact[missed]])
     return OctantParts(row, region, weights, parts.border_octant, parts.border)
 
 
@@ -170,7 +169,7 @@ def _made_definite(cells: FiniteCells, region: RegionOf, shared: SharedCells) ->
 
     What lines miss of an octant is in its largest part, and may be negative somewhere.
     """
-    own = np.unique(shared.cell)
+    own, first = np.unique(shared.cell, return_index=True)
     if not len(own):
         return shared
     ones = np.ones(cells.mesh.n_cells), np.ones(len(shared.cell))
@@ -196,7 +195,7 @@ def _made_definite(cells: FiniteCells, region: RegionOf, shared: SharedCells) ->
     share = np.append(lacks, -lacks)
     return SharedCells(
         np.append(shared.cell, cell),
-        np.append(shared.octant, (cells.voxels[cell] >= 0).argmax(axis=1)),
+        np.append(shared.octant, np.tile(shared.octant[first][row], 2)),
         np.concatenate([numbers, law[own[row], slot], law[own[row], spare]]),
         np.concatenate([shared.weights, share[:, None] * octant_weights().sum(axis=0)]),
         shared.borders,
