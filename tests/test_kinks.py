@@ -1,0 +1,88 @@
+"""Finite cells across the border of two materials."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from carillon.composition.domains import Everywhere, Expression
+from carillon.composition.materials import named_material
+from carillon.fem.finite_cells.kinks import Borders
+from carillon.fem.regions import Regions
+from tests.test_regions import OBLIQUE, solid, spectrum
+
+STIFF, SOFT = Regions.one(0.0, 7800.0, 2e11), Regions.one(0.0, 1200.0, 2e10)
+LENGTH, SIDE, CUT = 0.2, 0.02, 0.0137
+ROD = trimesh.creation.box(extents=[LENGTH, SIDE, SIDE])
+
+
+def without_kinks(model):
+    return replace(model, shared=replace(model.shared, borders=Borders.nothing()))
+
+
+def longitudinal(model):
+    """Lowest frequencies squared [rad^2/s^2] of motions along a rod alone."""
+    import scipy.linalg as la
+
+    from solver.assembly.sparse import assembled
+
+    K, M = (matrix.toarray() for matrix in assembled(model))
+    # One displacement for all nodes of a section: without Poisson's effect sections stay plane.
+    places, section = np.unique(model.mesh.nodes[:, 0].round(9), return_inverse=True)
+    along = np.zeros((len(K), len(places)))
+    along[3 * np.arange(len(section)), section] = 1.0
+    return la.eigh(along.T @ K @ along, along.T @ M @ along, eigvals_only=True)[1:3]
+
+
+def exact():
+    """The same by the transcendental equation of a rod of two materials."""
+    from studies.accuracy.beams import RodPart, rod_frequencies
+
+    parts = [
+        RodPart(LENGTH / 2 + sign * CUT, each.young[0], each.density[0])
+        for sign, each in ((1.0, STIFF), (-1.0, SOFT))
+    ]
+    return (2.0 * np.pi * rod_frequencies(*parts, 2)) ** 2
+
+
+def test_a_rod_of_two_materials_is_as_its_equation_says():
+    parts = [(STIFF, Everywhere()), (SOFT, Expression(f"x > {CUT}"))]
+    errors = []
+    for resolution in (20, 40):
+        model = solid(parts, "finite-cell", ROD, resolution)
+        values = [longitudinal(each) for each in (model, without_kinks(model))]
+        errors.append([np.abs(value / exact() - 1.0).max() for value in values])
+    assert errors[1][0] < 2e-3
+    assert errors[1][0] < errors[0][0] / 3.0
+    assert errors[1][0] < errors[1][1] / 10.0
+
+
+def test_there_is_no_kink_without_a_jump():
+    steel = named_material("steel").region("steel")
+    model = solid([(steel, Everywhere()), (steel, OBLIQUE)], "finite-cell")
+    assert len(model.shared.borders)
+    assert np.abs(model.elements.kinks.follow).max() < 1e-8
+
+
+def test_stiffness_stays_linear_in_factors():
+    steel, spruce = (named_material(name).region(name) for name in ("steel", "spruce"))
+    model = solid([(steel, Everywhere()), (spruce, OBLIQUE)], "finite-cell")
+    own = model.regions.young[model.region]
+    one, other = np.random.default_rng(0).uniform(0.1, 10.0, (2, len(own)))
+    sums = [model.with_young(own * each).stiffness() for each in (one, other, one + 2.0 * other)]
+    assert np.allclose(sums[0] + 2.0 * sums[1], sums[2], rtol=1e-9, atol=1e-9 * sums[2].max())
+
+
+@pytest.mark.parametrize("names", [("steel", "spruce"), ("rubber", "iron")])
+def test_no_strain_sets_energy_free(names):
+    one, other = (named_material(name).region(name) for name in names)
+    model = solid([(one, Everywhere()), (other, OBLIQUE)], "finite-cell")
+    values = np.linalg.eigvalsh(model.stiffness())
+    assert (values[:, 0] > -1e-12 * values[:, -1]).all()
+
+
+def test_kinks_only_make_a_solid_softer():
+    steel, spruce = (named_material(name).region(name) for name in ("steel", "spruce"))
+    model = solid([(steel, Everywhere()), (spruce, OBLIQUE)], "finite-cell")
+    assert (spectrum(model)[6:] <= spectrum(without_kinks(model))[6:] * (1.0 + 1e-9)).all()
