@@ -227,6 +227,14 @@ class CompositionEntry:
             if names.count(name) > 1:
                 raise ValueError(f"two regions are called {name!r}; give each a name of its own")
 
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether no region is of wood, or has axes otherwise.
+
+        Raises UserError as `RegionEntry.row` does.
+        """
+        return all(each.row().is_isotropic for each in self.regions)
+
 
 @dataclass(frozen=True)
 class Placed:
