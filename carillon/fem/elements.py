@@ -104,9 +104,9 @@ class Elements(ABC):
         """The same elements with other moduli."""
         return self.of(young, *self.arrays()[1:])
 
-    def with_poisson(self, poisson: float) -> Self:
-        """The same elements with another Poisson's ratio."""
-        return replace(cast(Any, self), regions=self.regions.with_poisson(poisson))
+    def with_regions(self, regions: Regions) -> Self:
+        """The same elements of other materials."""
+        return replace(cast(Any, self), regions=regions)
 
     def __len__(self) -> int:
         return len(self.young)

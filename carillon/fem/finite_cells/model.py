@@ -25,13 +25,13 @@ from carillon.fem.supports import Attached, Supports
 class CellElements(Elements):
     """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside."""
 
-    ROWS = ("young", "share", "law", "span", "kinds", "support")
+    ROWS = ("young", "shares", "law", "span", "kinds", "support")
 
     young: Array
     """(c, s, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`, of
     what the cell holds of each of its regions."""
-    share: Array
-    """(c, 125) the same of the density over that of the first region."""
+    shares: Array
+    """(c, s, 125) the points' weights of what the cell holds of each of its regions."""
     edge: float
     """Step of the lattice [m]."""
     regions: Regions
@@ -101,9 +101,21 @@ class CellElements(Elements):
             matrices *= edges
         return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
 
+    @property
+    def share(self) -> Array:
+        """(c, 125) weighted densities at the points, over that of the first region."""
+        return self._share(slice(None))
+
+    def _share(self, chosen: Chosen) -> Array:
+        shares = self.shares[chosen]
+        if self.law is None:
+            return shares[:, 0]
+        ratios = (self.regions.density / self.regions.density[0])[self.law[chosen]]
+        return np.einsum("cs,csp->cp", ratios, shares)
+
     def _nodal_mass(self, chosen: Chosen) -> Array:
         scale = float(self.regions.density[0]) * self.edges(chosen) ** 3
-        matrices = (scale * self.share[chosen]) @ point_mass()
+        matrices = (scale * self._share(chosen)) @ point_mass()
         return self._between_nodes(matrices.reshape(-1, 27, 27), chosen)
 
 
@@ -131,12 +143,12 @@ class FiniteCellModel(Solid):
     def elements(self) -> CellElements:
         # Made once, since the weights of all cells go into them.
         young, law = self._point_moduli(self.young)
-        share = self._shares()
+        shares = self._shares()
         span = self.cells.span if self.cells.is_mixed else None
         support, attached = self.attached()
         return CellElements(
             young,
-            share,
+            shares,
             self.mesh.edge,
             self.regions,
             law,
@@ -146,6 +158,10 @@ class FiniteCellModel(Solid):
             attached,
         )
 
+    def linear_moduli(self, along: Array) -> Array:
+        """Moduli (c, s, 125) at the points of cells, of voxels' (m,) that may be negative."""
+        return self._point_moduli(along)[0]
+
     def _point_moduli(self, young: Array) -> tuple[Array, RegionOf | None]:
         if self.region is None:
             return self.cells.point_values(young)[:, None], None
@@ -153,8 +169,8 @@ class FiniteCellModel(Solid):
 
     def _shares(self) -> Array:
         if self.region is None:
-            return self.cells.point_values(np.ones(self.mesh.n_cells))
-        return point_shares(self.cells, self.regions, self.region, self.shared)
+            return self.cells.point_values(np.ones(self.mesh.n_cells))[:, None]
+        return point_shares(self.cells, self.region, self.shared)
 
     @property
     def connectivity(self) -> NDArray[np.int32]:
@@ -180,7 +196,7 @@ class FiniteCellModel(Solid):
         if self.region is None:
             return float(self.regions.density[0]) * self.cells.volume
         edges = self.cells.span * self.mesh.edge
-        volumes = self._shares().sum(axis=1) * edges**3
+        volumes = self.elements.share.sum(axis=1) * edges**3
         return float(self.regions.density[0] * volumes.sum())
 
     @property
