@@ -53,6 +53,7 @@ __all__ = [
     "extract",
     "generate",
     "load_mesh",
+    "matrices",
     "read",
     "render",
     "solve",

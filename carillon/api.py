@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.figure import Figure
     from mpi4py import MPI
+    from scipy.sparse import csr_matrix
 
     from forests.model import Model
     from solver.files.modes_file import ModesFile
@@ -117,7 +118,9 @@ class Mesh:
 
 
 def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
-    """The surface in a mesh file (OBJ, STL, PLY, OFF, glTF), or `builtin:NAME`.
+    """The surface in a mesh file, or `builtin:NAME`.
+
+    Files are OBJ, STL, PLY, OFF, glTF, 3MF, or of volume elements (Gmsh, VTU, Abaqus, ...).
 
     Raises UserError if there is no such mesh, or it is no surface around a solid. `unit`: metres
     per unit of the file.
@@ -277,27 +280,14 @@ class Solution:
             )
 
     def to_vtu(self, path: str | Path) -> None:
-        """Write mesh, moduli and modes for ParaView; finite cells as cubes with eight nodes.
+        """Write mesh, moduli and modes for ParaView; of finite cells the octants with material.
 
         Raises UserError if it cannot be written.
         """
-        import meshio
+        from solver.exchange.modes_vtu import StreamedModes, write_all_modes
 
-        from carillon.files.atomic import atomic_path
-
-        if self.solid is None or self.shapes is None:
-            return
-        mesh = self.solid.hexmesh
-        corners = mesh.cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
-        fields = {
-            f"mode {number}, {hertz:.4g} Hz": np.ascontiguousarray(shape)
-            for number, (hertz, shape) in enumerate(zip(self.frequencies, self.shapes), 1)
-        }
-        young = self.solid.young.reshape(len(self.solid.young), -1).mean(axis=1)
-        cells = {"Young's modulus [Pa]": [young]} if len(young) == len(corners) else {}
-        grid = meshio.Mesh(mesh.nodes, [("hexahedron", corners)], fields, cells)
-        with atomic_path(path) as temporary:
-            grid.write(temporary, file_format="vtu")
+        if self.solid is not None:
+            write_all_modes(path, StreamedModes.of_contents(self._file()))
 
     def _file(self) -> ModesFile:
         from solver.files.modes_file import ModesFile
@@ -411,6 +401,28 @@ def coarsen(
     region = fine.cell_regions if isinstance(fine, ElasticModel) else None
     constants: Constants = {"regions": fine.regions, "supports": fine.supports}
     return build_model(fine.mesh, young, coarsening, region=region, **constants)
+
+
+def matrices(
+    body: Body, material: Given = None, resolution: int = 32, discretisation: str = "voxel"
+) -> tuple[csr_matrix, csr_matrix]:
+    """Stiffness [N/m] and mass [kg] of a solid, (3 n, 3 n), for solvers of your own.
+
+    Row 3 i + a is the displacement of node i of the solid's `mesh.nodes` along axis a, so that an
+    eigenvector reshaped to (n, 3) is a shape. The six least eigenvalues [rad^2/s^2] are zero.
+    Raises UserError for anything wrong with the solid. Parameters: see `solve`.
+
+    Examples
+    --------
+    >>> solution = ca.solve("builtin:box", resolution=4, modes=8)
+    >>> K, M = ca.matrices(solution.solid)
+    >>> shape = solution.shapes[6].ravel()
+    >>> bool(np.isclose(shape @ K @ shape, solution.eigenvalues[6])), round(shape @ M @ shape, 9)
+    (True, 1.0)
+    """
+    from solver.exchange.matrices import matrices as assembled
+
+    return assembled(_solid(body, material, resolution, discretisation))
 
 
 def read(path: str | Path) -> Solution | Design:

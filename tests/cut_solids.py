@@ -8,6 +8,7 @@ from trimesh.transformations import euler_matrix
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.regions import Regions
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from studies.accuracy.solids import ANGLES, DENSITY, POISSON, YOUNG
@@ -30,7 +31,9 @@ def spaced(surface: trimesh.Trimesh, spacing: float) -> FiniteCells:
 
 def uniform(cells: FiniteCells) -> FiniteCellModel:
     """Of one modulus."""
-    return finite_cell_model(cells, np.full(cells.mesh.n_cells, YOUNG), POISSON, DENSITY)
+    return finite_cell_model(
+        cells, np.full(cells.mesh.n_cells, YOUNG), Regions.one(POISSON, DENSITY)
+    )
 
 
 def eigenvalues(model: FiniteCellModel, count: int) -> NDArray[np.float64]:

@@ -30,6 +30,7 @@ EVERYBODY = (
     "carillon.fem",
     "carillon.fem.geometry",
     "carillon.fem.finite_cells",
+    "carillon.composition",
     "carillon.drawing",
 )
 """Packages that all others may import."""
@@ -47,12 +48,14 @@ ARROWS = {
     "carillon.fem": "carillon carillon.fem.geometry carillon.files carillon.processes",
     "carillon.drawing": "carillon.fem.geometry",
     "carillon.fem.finite_cells": "carillon carillon.fem carillon.fem.geometry",
+    "carillon.composition": """carillon carillon.fem carillon.fem.finite_cells carillon.fem.geometry
+        carillon.files carillon.parameters""",
     #
     "dataset_gen.objectives": "",
     "dataset_gen": "dataset_gen.objectives",
     "dataset_gen.commands": "dataset_gen dataset_gen.objectives",
     #
-    "forests": "",
+    "forests": "dataset_gen.objectives",
     "forests.training": "dataset_gen dataset_gen.objectives forests",
     "forests.commands": "forests forests.training",
     #
@@ -63,6 +66,7 @@ ARROWS = {
     "solver.subspace": "solver.assembly solver.distribution",
     "solver.linear": "solver.assembly solver.distribution",
     "solver.response": "solver.files solver.subspace",
+    "solver.exchange": "solver.assembly solver.files solver.response",
     "solver.reference": "solver.assembly solver.linear solver.subspace",
     "solver.correction": "solver.assembly solver.distribution solver.linear solver.subspace",
     "solver.hcms": "solver.assembly solver.distribution solver.linear solver.subspace",
@@ -76,8 +80,8 @@ ARROWS = {
         solver.distribution solver.files solver.linear solver.subspace""",
     "solver.accuracy": "solver.analysis solver.distribution solver.files solver.refinement",
     "solver.commands": """solver.accuracy solver.analysis solver.coarsening solver.correction
-        solver.distribution solver.files solver.linear solver.refinement solver.response
-        solver.verification""",
+        solver.distribution solver.exchange solver.files solver.linear solver.refinement
+        solver.response solver.verification""",
     #
     "sound": "solver.response",
     "sound.synthesis": "solver.response",

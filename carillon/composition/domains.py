@@ -7,7 +7,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Flags, Surface
 from carillon.errors import UserError
 from carillon.fem.geometry.grid import bounding_grid
+from carillon.fem.geometry.labels import Labels
 from carillon.fem.geometry.winding import Winding
 
 LONGEST_TEXT = 1000
@@ -79,13 +80,6 @@ class ClosedSurface(Domain):
             places = (points[chosen] - self._grid.origin) / self._grid.edge
             inside[chosen] = self._winding.inside(places)
         return np.asarray(inside)
-
-
-class Labels(Protocol):
-    """Numbers of places, of a file for example."""
-
-    def at(self, points: Array) -> NDArray[np.int32]:
-        """Number (p,) at each of the points (p, 3) [m]; -1 where there is none."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,15 @@ import numpy as np
 
 from carillon.arrays import Surface
 from carillon.composition.composition import AxesAt, Composition, MaterialRegion, axes_about
-from carillon.composition.domains import Ball, Box, ClosedSurface, Domain, Everywhere, Expression
+from carillon.composition.domains import (
+    Ball,
+    Box,
+    ClosedSurface,
+    Domain,
+    Everywhere,
+    Expression,
+    Labelled,
+)
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.composition.supports import Support
 from carillon.errors import UserError
@@ -74,12 +82,26 @@ class RegionEntry:
     )
     box: tuple[Vector, Vector] | None = option(None, "lowest and highest corner of a box [m]")
     mesh: str | None = option(None, "file of a closed surface around it, relative to this file")
-    unit: MetresPerUnit = option(1.0)
+    part: str | None = option(
+        None, "name of a part of the solid's mesh (glTF, OBJ, 3MF), or of that file"
+    )
+    labels: str | None = option(
+        None, "file that labels the solid's parts (.msh, .vtu, .vti, .npy), relative to this file"
+    )
+    label: Annotated[str, Within(min_length=1, max_length=100)] | None = option(
+        None, "name or number of its label in that file"
+    )
+    unit: MetresPerUnit = option(1.0, "metres per unit of its mesh or labels [m]")
 
     def __post_init__(self) -> None:
-        places = [name for name in ("where", "box", "mesh") if getattr(self, name) is not None]
+        kinds = ("where", "box", "mesh", "labels")
+        places = [name for name in kinds if getattr(self, name) is not None]
         if len(places) > 1:
             raise ValueError(f"expected one place, found {' and '.join(places)}")
+        if self.part is not None and places and places != ["mesh"]:
+            raise ValueError(f"expected one place, found part and {places[0]}")
+        if (self.labels is None) != (self.label is None):
+            raise ValueError("labels and label go together")
         given = [self.grain_young, self.grain_shear, self.grain_poisson]
         if any(each is not None for each in given) and None in given:
             raise ValueError("grain_young, grain_shear and grain_poisson go together")
@@ -117,8 +139,8 @@ class RegionEntry:
         except UserError as error:
             raise UserError(f"region {self.name!r}: {error}") from None
 
-    def domain(self, folder: Path) -> Domain:
-        """Where it is; files are relative to a folder."""
+    def domain(self, solid: SolidFrame) -> Domain:
+        """Where it is in a solid."""
         if self.where is not None:
             return Expression(self.where)
         if self.box is not None:
@@ -129,12 +151,23 @@ class RegionEntry:
                     "expected its lowest and highest corner"
                 )
             return Box(low, high)
+        if self.labels is not None and self.label is not None:
+            return _labelled(_path(self.labels, solid.folder), self.label, self.unit, solid)
         if self.mesh is not None:
-            from carillon.fem.geometry import load_surface  # Its import takes long.
-
-            path = self.mesh if self.mesh.startswith("builtin:") else str(folder / self.mesh)
-            return ClosedSurface(load_surface(path, self.unit))
+            return ClosedSurface(self.own_surface(solid.folder))
+        if self.part is not None:
+            return ClosedSurface(_part(solid.mesh, self.part, solid.unit, self.name))
         return Everywhere()
+
+    def own_surface(self, folder: Path) -> Surface:
+        """The closed surface in its mesh file, which is relative to a folder."""
+        from carillon.fem.geometry import load_surface  # Its import takes long.
+
+        assert self.mesh is not None
+        path = _path(self.mesh, folder)
+        if self.part is not None:
+            return _part(path, self.part, self.unit, self.name)
+        return load_surface(path, self.unit)
 
     def axes(self) -> np.ndarray | AxesAt | None:
         """Axes of the material, or where they lie at each place."""
@@ -236,12 +269,60 @@ class CompositionEntry:
         return all(each.row().is_isotropic for each in self.regions)
 
 
+def _path(file: str, folder: Path) -> str:
+    return file if file.startswith("builtin:") else str(folder / file)
+
+
+def _part(path: str, name: str, unit: float, region: str) -> Surface:
+    """All parts of that name together."""
+    from carillon.fem.geometry.parts import named_surfaces
+
+    parts = named_surfaces(path, unit)
+    own = [surface for each, surface in parts if each == name]
+    if not own:
+        known = ", ".join(sorted({each for each, _ in parts}))
+        raise UserError(f"region {region!r}: {path} has no part {name!r}, only {known}")
+    return own[0] if len(own) == 1 else _joined(own)
+
+
+def _labelled(path: str, label: str, unit: float, solid: SolidFrame) -> Domain:
+    from carillon.fem.geometry.labels import read_labels
+
+    labels = read_labels(path, unit, box=np.asarray(solid.surface.bounds))
+    numbers = [number for number, name in labels.names.items() if name == label]
+    if not numbers and label.isdigit() and int(label) in labels.names:
+        numbers = [int(label)]
+    if not numbers:
+        raise UserError(f"{path}: has no label {label!r}, only {', '.join(labels.names.values())}")
+    return Labelled(labels, tuple(numbers))
+
+
+@dataclass(frozen=True)
+class SolidFrame:
+    """The solid that regions and supports are of."""
+
+    mesh: str
+    """Path of its mesh, or `builtin:NAME`."""
+    surface: Surface
+    """Triangles around it [m]."""
+    name: str
+    unit: float = 1.0
+    """Metres per unit of the mesh."""
+    folder: Path = Path()
+    """That files of entries are relative to."""
+
+
 @dataclass(frozen=True)
 class Placed:
     """Regions and supports with their places."""
 
     composition: Composition | None
     supports: tuple[Support, ...]
+
+
+def describes_regions(path: str) -> bool:
+    """Whether a solid is given by a file of regions in place of a mesh."""
+    return Path(path).suffix.lower() in (".yaml", ".yml")
 
 
 def read_composition(path: str | Path) -> CompositionEntry:
@@ -252,28 +333,44 @@ def read_composition(path: str | Path) -> CompositionEntry:
     return read_parameters(path, CompositionEntry, "regions and supports of a solid")
 
 
-def compose(
-    entry: CompositionEntry,
-    surface: Surface,
-    name: str,
-    folder: Path = Path(),
-    fixed: Sequence[str] = (),
-) -> Placed:
-    """Regions and supports of the solid inside a surface.
+def compose(entry: CompositionEntry, solid: SolidFrame, fixed: Sequence[str] = ()) -> Placed:
+    """Regions and supports of a solid.
 
-    Parameters
-    ----------
-    folder
-        That files of the entry are relative to.
-    fixed
-        Further places that are held, see `SupportEntry.where`.
+    Further places are `fixed`, held there, see `SupportEntry.where`. Raises UserError for files,
+    materials and places that are of no use.
     """
-    domains = {each.name: each.domain(folder) for each in entry.regions}
+    domains = {each.name: each.domain(solid) for each in entry.regions}
     composition = None
     if entry.regions:
         parts = [
             MaterialRegion(each.row(), domains[each.name], each.axes()) for each in entry.regions
         ]
-        composition = Composition(parts, name, ClosedSurface(surface))
+        composition = Composition(parts, solid.name, ClosedSurface(solid.surface))
     entries = [*entry.supports, *(SupportEntry(where=where) for where in fixed)]
     return Placed(composition, tuple(each.support(domains) for each in entries))
+
+
+def joined_surface(entry: CompositionEntry, path: str) -> Surface:
+    """The surface around all regions of a file, each of which is a closed surface.
+
+    Raises UserError if one is not, or there are none.
+    """
+    folder = Path(path).parent
+    surfaces: list[Surface] = []
+    for each in entry.regions:
+        if each.mesh is None:
+            raise UserError(
+                f"{path}: region {each.name!r} has no mesh; a solid made of its regions needs one "
+                "of each, or name the solid's own mesh and --regions"
+            )
+        surfaces.append(each.own_surface(folder))
+    if not surfaces:
+        raise UserError(f"{path}: has no regions; expected some with a mesh each")
+    return _joined(surfaces)
+
+
+def _joined(surfaces: list[Surface]) -> Surface:
+    vertices = np.concatenate([np.asarray(each.vertices) for each in surfaces])
+    first = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
+    faces = [np.asarray(each.faces) + start for each, start in zip(surfaces, first)]
+    return type(surfaces[0])(vertices, np.concatenate(faces), process=False)

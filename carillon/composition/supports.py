@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.arrays import Array, Surface
+from carillon.arrays import Array, Index, Surface
 from carillon.composition.domains import ClosedSurface, Domain
 from carillon.errors import UserError
 from carillon.fem.model import Solid
 from carillon.fem.supports import Supports
 
-HELD = 1e6
+HELD = 1e5
 """Stiffness of the spring at a held point, in multiples of modulus times lattice spacing. What is
-held moves by a millionth of what one spacing of the solid is strained."""
+held moves by a hundred thousandth of what one spacing of the solid is strained."""
 SAMPLE = 0.5
 """Largest edge of the triangles whose middles stand for a surface, in lattice spacings."""
 SLIGHT = 1e-6
@@ -94,7 +94,7 @@ class _Samples:
         size = float(np.ptp(np.asarray(surface.bounds), axis=0).max())
         return cls(corners[kept].mean(axis=1), normals, 0.5 * length[kept], size)
 
-    def inside(self, domain: Domain) -> Array:
+    def inside(self, domain: Domain) -> Index:
         """Numbers of those in a domain, or at its border."""
         slightly = SLIGHT * self.size * self.normals
         near = [domain.contains(self.points + side * slightly) for side in (0.0, 1.0, -1.0)]

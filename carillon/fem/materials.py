@@ -9,7 +9,7 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import UserError
-from carillon.fem.moduli import read_moduli
+from carillon.fem.moduli import read_moduli, require_moduli
 from carillon.files.paths import require_file
 
 if TYPE_CHECKING:  # Geometry needs trimesh, whose import takes long; names of materials do without.
@@ -44,11 +44,15 @@ def smooth_field(mesh: HexMesh, seed: int = 0) -> Array:
     return np.asarray(field / peak if peak > 0.0 else field)
 
 
-def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") -> Array:
-    """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file with one value per cell.
+def young_modulus(
+    name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh", unit: float = 1.0
+) -> Array:
+    """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file.
 
-    Raises UserError if there is no such file, or for what `carillon.fem.moduli.read_moduli`
-    refuses.
+    A file holds one value per cell, or is a mesh of volume elements or an image (.vti) with Young's
+    moduli: then each cell has that of the element in which its middle lies, or which is nearest.
+    Raises UserError if there is no such file, for what `carillon.fem.moduli` refuses, or if a mesh
+    or an image is elsewhere than the cells. `unit`: metres per unit of its coordinates.
 
     Examples
     --------
@@ -74,4 +78,22 @@ def young_modulus(name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh") 
         raise UserError(
             f"material {name!r} is neither a file nor one of the names {', '.join(NAMES)}"
         )
-    return read_moduli(require_file(name, "a material, a file of moduli"), count, label)
+    path = require_file(name, "a material, a file of moduli")
+    if not _is_cell_file(name):
+        return read_moduli(path, count, label)
+    return _of_cells(name, mesh, unit)
+
+
+def _is_cell_file(name: str) -> bool:
+    from carillon.fem.geometry.labels import is_cell_file  # Its import takes long.
+
+    return is_cell_file(name)
+
+
+def _of_cells(name: str, mesh: HexMesh, unit: float) -> Array:
+    from carillon.fem.geometry.labels import read_cell_moduli
+
+    moduli = read_cell_moduli(name, unit)
+    size = mesh.edge if mesh.span is None else mesh.edge * mesh.span[:, None]
+    middles = mesh.origin + mesh.edge * mesh.grid + 0.5 * size
+    return require_moduli(moduli.at(middles), mesh.n_cells, name, points=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.element import rigid_motions
 
 FREE = 1e-9
@@ -35,19 +35,23 @@ class Supports:
         names = ("positions", "stiffness", "mass")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
+    @property
+    def holds(self) -> Flags:
+        """Which (p,) resist some motion: masses do not."""
+        return np.asarray(self.stiffness.any(axis=(1, 2)))
+
     def free_motions(self, centre: Array, extent: float) -> Array:
         """Rigid motions that nothing resists, (6, r) orthonormal combinations.
 
         They are of `carillon.fem.element.rigid_motions` about `centre` (3,) [m] in units of
         `extent` [m]. How stiff a spring is does not matter.
         """
-        scale = np.linalg.norm(self.stiffness, axis=(1, 2))
-        holds = scale > 0.0
-        if not holds.any():
+        springs = self.stiffness[self.holds]
+        if not len(springs):
             return np.eye(6)
-        places = (self.positions[holds] - centre) / extent
+        places = (self.positions[self.holds] - centre) / extent
         motions = rigid_motions(places, np.zeros(3)).reshape(-1, 3, 6)
-        unit = self.stiffness[holds] / scale[holds, None, None]
+        unit = springs / np.linalg.norm(springs, axis=(1, 2), keepdims=True)
         resistance = np.einsum("pia,pij,pjb->ab", motions, unit, motions)
         values, vectors = np.linalg.eigh(resistance)
         return np.ascontiguousarray(vectors[:, values < FREE * values[-1]])

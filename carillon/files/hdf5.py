@@ -190,6 +190,15 @@ def open_h5(
             ) from error
 
 
+def require_whole_h5(path: str | Path) -> None:
+    """Check an HDF5 file of another program, which has no seal, before that program's rules apply.
+
+    Raises UserError, see `require_whole`, and OSError if it is no HDF5 file.
+    """
+    with _opened(Path(path)) as file:
+        require_whole(file)
+
+
 def kind_of(path: str | Path, what: str) -> tuple[str, int]:
     """Kind and schema version that a file claims; no kind if it is no file of this project.
 

@@ -12,7 +12,14 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.composition.composition import PlacedRegions
-from carillon.composition.entries import CompositionEntry, Placed, compose, read_composition
+from carillon.composition.entries import (
+    CompositionEntry,
+    Placed,
+    SolidFrame,
+    compose,
+    describes_regions,
+    read_composition,
+)
 from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem import materials
@@ -56,7 +63,9 @@ AUTO = "auto"
 class ProblemOptions:
     """The solid to analyse."""
 
-    mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
+    mesh: str = option(
+        REQUIRED, "surface mesh file, builtin:NAME, or YAML file of regions with a mesh each"
+    )
     resolution: Resolution = option(REQUIRED)
     material: str = option(
         "uniform",
@@ -180,7 +189,7 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     surface.doubt_unit()
     meshed = time.perf_counter()
     label = f"mesh '{surface.name}', resolution {options.resolution}"
-    young = young_modulus(options.material, mesh, options.seed, label)
+    young = young_modulus(options.material, mesh, options.seed, label, options.unit)
     composed = _composed(options, surface)
     placed = PlacedRegions(Regions.one(options.poisson, options.density))
     if composed.composition is not None:
@@ -209,9 +218,13 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
 def _composed(options: ProblemOptions, surface: SolidSurface) -> Placed:
     """Regions and supports that the options name."""
     entry, folder = CompositionEntry(), Path()
-    if options.regions is not None:
-        entry, folder = read_composition(options.regions), Path(options.regions).parent
-    return compose(entry, surface.triangles, surface.name, folder, options.fix or ())
+    described = options.regions
+    if described is None and describes_regions(options.mesh):
+        described = options.mesh
+    if described is not None:
+        entry, folder = read_composition(described), Path(described).parent
+    frame = SolidFrame(options.mesh, surface.triangles, surface.name, options.unit, folder)
+    return compose(entry, frame, options.fix or ())
 
 
 def _held(solid: Held, composed: Placed, surface: SolidSurface) -> Held:

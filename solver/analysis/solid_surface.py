@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from carillon.arrays import Surface
+from carillon.composition.entries import describes_regions, joined_surface, read_composition
 from carillon.fem.geometry import load_surface, surface_name
 from carillon.fem.geometry.size import doubt_unit
 
@@ -21,7 +22,12 @@ class SolidSurface:
 
     @classmethod
     def read(cls, mesh: str, unit: float = 1.0) -> Self:
-        """Read the mesh, see `carillon.fem.geometry.load_surface` also for the errors."""
+        """Read the mesh, see `carillon.fem.geometry.load_surface` also for the errors.
+
+        Of a file of regions with a mesh each it is that of all together.
+        """
+        if describes_regions(mesh):
+            return cls(mesh, joined_surface(read_composition(mesh), mesh), unit)
         return cls(mesh, load_surface(mesh, unit), unit)
 
     @property

@@ -71,6 +71,8 @@ class System:
     """(local, r) M times these."""
     coordinates: Array
     """(local nodes, 3) positions relative to the centroid, in units of the largest half extent."""
+    supported: Array | None
+    """(p, 3) all supports' positions likewise, those of masses aside; None of a free solid."""
     nodes: Index
     """(local nodes,) numbers of this rank's nodes in the mesh."""
     start: int
@@ -79,6 +81,14 @@ class System:
     n_dofs: int
     """Number of unknowns over all ranks."""
     comm: MPI.Comm
+
+    def distance_from_supports(self) -> Array | None:
+        """Distance (local nodes,) from the nearest support, in half extents; None without any."""
+        if self.supported is None:
+            return None
+        from scipy.spatial import cKDTree  # Its import takes long.
+
+        return np.asarray(cKDTree(self.supported).query(self.coordinates)[0])
 
     @property
     def n_rigid(self) -> int:
@@ -214,10 +224,12 @@ def assemble(
     if like is not None:
         return replace(like, rows=rows)
     # About the centroid of the whole body: every rank must hold rows of the same six motions.
-    motions = rigid_motions(layout.coordinates, np.zeros(3))
+    motions, supported = rigid_motions(layout.coordinates, np.zeros(3)), None
     if elements.attached is not None:
         supports = elements.attached.supports
         motions = motions @ supports.free_motions(layout.centre, layout.extent)
+        if supports.holds.any():
+            supported = (supports.positions[supports.holds] - layout.centre) / layout.extent
     motions = np.ascontiguousarray(motions)
     mass_motions = rows.times_mass(motions)
     system = System(
@@ -225,6 +237,7 @@ def assemble(
         motions,
         mass_motions,
         layout.coordinates,
+        supported,
         local_mesh.nodes,
         local_mesh.start,
         local_mesh.stop,

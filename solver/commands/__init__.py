@@ -11,5 +11,7 @@ COMMANDS = {
         "solver.commands.audit",
         "residuals, orthogonality and inertia count anew, from modes files alone",
     ),
+    "vtu": Command("solver.commands.vtu", "modes for ParaView, PyVista and meshio"),
+    "matrices": Command("solver.commands.matrices", "stiffness and mass for other eigensolvers"),
     "respond": Command("solver.commands.respond", "motion and sound of a strike (Fig. 12, 13)"),
 }

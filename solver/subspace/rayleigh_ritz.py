@@ -143,16 +143,20 @@ def rigid_pairs(system: System) -> tuple[Array, Array]:
 def first_elastic_estimate(system: System) -> float:
     """Upper bound [rad^2/s^2] of the first elastic eigenvalue, from polynomial displacement fields.
 
-    It depends on the solid alone, not on a start block. Raises ConvergenceError if a motion other
-    than the six rigid ones costs no energy.
+    It depends on the solid alone, not on a start block. Of a held solid the fields also come times
+    the distance from the supports, so that some leave these alone. Raises ConvergenceError if a
+    motion of a free solid other than the six rigid ones costs no energy.
     """
     degrees = range(POLYNOMIAL_DEGREE + 1)
     powers = [(a, b, c) for a in degrees for b in degrees for c in degrees]
     powers = [power for power in powers if sum(power) <= POLYNOMIAL_DEGREE]
     fields = np.stack([(system.coordinates**power).prod(axis=1) for power in powers], axis=1)
+    distance = system.distance_from_supports()
+    if distance is not None:
+        fields = np.concatenate([fields, distance[:, None] * fields], axis=1)
     block = np.einsum("np,ij->nipj", fields, np.eye(3)).reshape(3 * len(fields), -1)
     values, _ = ritz_weights(system, np.ascontiguousarray(block))
-    if values[0] <= HINGE_TOLERANCE * values[-1]:
+    if distance is None and values[0] <= HINGE_TOLERANCE * values[-1]:
         raise ConvergenceError(
             "a seventh zero-frequency mode found, a connected free body has six; part of the model "
             "hangs on a hinge or has almost no stiffness"

@@ -122,8 +122,11 @@ def require_orthonormal(orthogonality: float) -> None:
 def require_rigid(count: int, expected: int = RIGID_MODES) -> None:
     """Raise ConvergenceError unless `count` is the `expected` number of rigid modes."""
     if count != expected:
-        body = "a connected free body" if expected == RIGID_MODES else "the body as it is held"
+        if expected == RIGID_MODES:
+            body, springs = "a connected free body", ""
+        else:
+            body, springs = "the body as it is held", "springs are too soft to be told from none, "
         raise ConvergenceError(
-            f"{count} zero-frequency modes found, {body} has {expected}; part of "
-            "the model hangs on a hinge or has almost no stiffness"
+            f"{count} zero-frequency modes found, {body} has {expected}; {springs}part of the "
+            "model hangs on a hinge or has almost no stiffness"
         )

@@ -160,6 +160,7 @@ each(
     MESH,
     (
         "ZOO/empty.obj ZOO/empty.stl ZOO/empty.ply ZOO/empty.glb ZOO/empty.off ZOO/empty.gltf "
+        "ZOO/{empty,junk}.{msh,vtu,vtk,inp,med,mesh} "
         "ZOO/empty.3mf ZOO/junk.obj ZOO/junk.stl ZOO/junk.ply ZOO/junk.glb ZOO/junk.off "
         "ZOO/junk.gltf ZOO/junk.3mf ZOO/cut.stl ZOO/cut.ply ZOO/cut.glb ZOO/claims.stl "
         "ZOO/claims.ply ZOO/claims.off ZOO/claims.glb ZOO/{foreign,relative}.gltf ZOO/box.xyzzy "
@@ -171,7 +172,8 @@ each(
     MESH,
     (
         "ZOO/grows-{zeros,sparse,instances,chain,circle,rows}.glb ZOO/grows-buffer.gltf "
-        "ZOO/grows-parts.3mf ZOO/grows-parts.dae"
+        "ZOO/grows-parts.3mf ZOO/grows-text.3mf ZOO/grows-{points,blocks}.vtu ZOO/grows-image.vtk "
+        "ZOO/grows-nodes.msh ZOO/grows-parts.dae"
     ),
 )
 each(
@@ -325,6 +327,43 @@ NO_MODES = (
 each("audit of", "audit VALUE", [f"ZOO/modes-{damage}.h5" for damage in DAMAGES])
 each("audit of", "audit VALUE", NO_MODES)
 each("audit of", "audit VALUE", [f"ZOO/{name}" for name in zoo_growing.FILES])
+each(
+    "modes for ParaView of",
+    "vtu VALUE --out m.vtu",
+    [f"ZOO/modes-{damage}.h5" for damage in DAMAGES],
+)
+each("modes for ParaView of", "vtu VALUE --out m.vtu", NO_MODES)
+hostile("modes for ParaView by another name", "vtu ZOO/modes.h5 --out m.vtk", ".vtu")
+hostile("motion without a mode", "vtu ZOO/modes.h5 --out m.pvd", "expected .vtu")
+for value in ("0", "-1", "1e3", "999999", "x"):
+    hostile(f"motion of mode {value}", f"vtu ZOO/modes.h5 --mode {value} --out m.pvd", "mode")
+for value in ("1", "-24", "1000000", "nan"):
+    words = f"vtu ZOO/modes.h5 --mode 7 --frames {value} --out m.pvd"
+    hostile(f"motion in {value} frames", words, "frames")
+for value in ("0", "-1", "inf", "nan"):
+    words = f"vtu ZOO/modes.h5 --mode 7 --amplitude {value} --out m.pvd"
+    hostile(f"motion by {value}", words, "amplitude")
+hostile(
+    "modes for ParaView on a full disk", "vtu ZOO/modes.h5 --out m.vtu", "make room", file_size=100
+)
+hostile("matrices of nothing", "matrices builtin:box --resolution 4", "expected --stiffness")
+# Modes are not read.
+each(
+    "matrices of",
+    "matrices VALUE --mass M.mtx",
+    [f"ZOO/modes-{damage}.h5" for damage in DAMAGES if damage != "nan"],
+)
+hostile(
+    "matrices of a mesh without resolution", "matrices ZOO/box.stl --mass M.mtx", "--resolution"
+)
+hostile("matrices by another name", "matrices ZOO/modes.h5 --mass M.csv", ".mtx")
+hostile(
+    "matrices onto each other", "matrices ZOO/modes.h5 --mass M.mtx --stiffness ./M.mtx", "differ"
+)
+for ending in ("mtx", "petsc", "npz"):
+    words = f"matrices ZOO/modes.h5 --mass M.{ending}"
+    hostile(f"matrices on a full disk, {ending}", words, "make room", file_size=100)
+hostile("matrices onto their input", "matrices m.h5 --nodes m.h5", files={"m.h5": Copy("modes.h5")})
 hostile("audit of a long name", ["audit", "x" * 300 + ".h5"])
 hostile("audit of a good and a bad one", "audit ZOO/modes.h5 ZOO/modes-cut.h5", "modes-cut.h5")
 control(
@@ -449,6 +488,8 @@ control(
     "out.h5",
 )
 control("PETSc options", [*MODES.split(), "--petsc", "-carillon_eps_ncv 40"], "out.h5")
+control("modes for ParaView", "vtu ZOO/modes.h5 --out m.vtu", "m.vtu")
+control("matrices", "matrices ZOO/modes.h5 --stiffness K.mtx --mass M.petsc", "K.mtx", "M.petsc")
 control("audit", "audit ZOO/modes.h5 ZOO/random.h5 --out audit.json", "audit.json")
 control("comparison", "compare ZOO/modes.h5 ZOO/random.h5")
 control(

@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import struct
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -111,6 +113,54 @@ def _texture(path: Path) -> None:
     path.write_bytes(BOX.export(file_type="ply").replace(b"end_header", named, 1))
 
 
+def _model_archive(path: Path, text: str) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", text)
+
+
+def _objects(path: Path) -> None:
+    """Objects in objects, two of each in the next: twice as many triangles with each."""
+    space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in BOX.vertices)
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in BOX.faces)
+    mesh = f"<mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>"
+    objects = [f'<object id="0">{mesh}</object>']
+    for number in range(1, LEVELS):
+        inner = f'<component objectid="{number - 1}"/>' * 2
+        objects.append(f'<object id="{number}"><components>{inner}</components></object>')
+    _model_archive(
+        path,
+        f'<model xmlns="{space}" unit="meter"><resources>{"".join(objects)}</resources>'
+        f'<build><item objectid="{LEVELS - 1}"/></build></model>',
+    )
+
+
+def _blanks(path: Path) -> None:
+    _model_archive(path, "<model>" + " " * (1 << 28) + "</model>")
+
+
+def _vtu(path: Path, points: int, blocks: bytes) -> None:
+    path.write_bytes(
+        b'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        b'header_type="UInt64" compressor="vtkZLibDataCompressor"><UnstructuredGrid>'
+        + f'<Piece NumberOfPoints="{points}" NumberOfCells="0"><Points>'.encode()
+        + b'<DataArray type="Float64" NumberOfComponents="3" format="appended" offset="0"/>'
+        b"</Points></Piece></UnstructuredGrid>"
+        b'<AppendedData encoding="raw">_' + blocks + b"</AppendedData></VTKFile>"
+    )
+
+
+def _points(path: Path) -> None:
+    """More points than fit into memory."""
+    _vtu(path, 10**12, b"")
+
+
+def _blocks(path: Path) -> None:
+    """A compressed block that is far longer than its header says."""
+    block = zlib.compress(bytes(1 << 30))
+    _vtu(path, 1, struct.pack("<4Q", 1, 24, 0, len(block)) + block)
+
+
 BOXES: dict[str, Callable[[Gltf], None]] = {
     "grows-picture.gltf": _picture,
     "grows-views.glb": _views,
@@ -128,7 +178,17 @@ MESHES: dict[str, Callable[[Path], object]] = {
     "grows-texture.ply": _texture,
     "grows-buffer.gltf": _large_buffer,
     "grows-instances.glb": _instances,
-    "grows-parts.3mf": lambda path: path.write_bytes(b"PK\3\4"),
+    "grows-parts.3mf": _objects,
+    "grows-text.3mf": _blanks,
+    "grows-points.vtu": _points,
+    "grows-blocks.vtu": _blocks,
+    "grows-image.vtk": lambda path: path.write_text(
+        "# vtk DataFile Version 4.2\n.\nASCII\nDATASET STRUCTURED_POINTS\n"
+        "DIMENSIONS 9999 9999 9999\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+    ),
+    "grows-nodes.msh": lambda path: path.write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n99999999999\n1 0 0 0\n$EndNodes\n"
+    ),
     "grows-parts.dae": lambda path: path.write_text("<COLLADA/>"),
 }
 """Names of other meshes, and what writes them."""

@@ -28,9 +28,13 @@ def make(folder: Path) -> None:
     _make_liars(folder)
 
 
+VOLUMES = ("msh", "vtu", "vtk", "inp", "med", "mesh")
+"""Endings of meshes with volume elements."""
+
+
 def _make_broken(folder: Path, text: str) -> None:
     random = np.random.default_rng(0)
-    for end in ("obj", "stl", "ply", "glb", "off", "gltf", "3mf"):
+    for end in ("obj", "stl", "ply", "glb", "off", "gltf", "3mf", *VOLUMES):
         (folder / f"empty.{end}").touch()
         (folder / f"junk.{end}").write_bytes(random.bytes(4096))
     for end in ("stl", "ply", "glb"):

@@ -6,6 +6,8 @@ Legal, but not read as what they say: positions in integers, normalised or not
 camera's node. What takes an extension that is not known here is refused (Khronos: glTF 2.0, 3.12).
 """
 
+from __future__ import annotations
+
 import base64
 import json
 import struct
@@ -44,9 +46,9 @@ _MAGIC, _VERSION, _JSON, _BINARY = b"glTF", 2, b"JSON", b"BIN\0"
 _FLOAT, _UINT32 = 5126, 5125
 _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", _UINT32: "<u4", _FLOAT: "<f4"}
 _COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+TRIANGLES, STRIP, _FAN = 4, 5, 6
 
-_CORNERS = {_TRIANGLES: 1, _STRIP: 3, _FAN: 3}
+_CORNERS = {TRIANGLES: 1, STRIP: 3, _FAN: 3}
 """Modes that are read, and corners of triangles for an index."""
 _POSITION_BYTES, _CORNER_BYTES = 12, 4
 
@@ -78,19 +80,28 @@ def plain_gltf(content: bytes, beside: ReadBeside, name: str) -> bytes:
     Exception
         Of any kind, for a file that is no glTF.
     """
+    header, reader = opened_gltf(content, beside, name)
+    data, meshes = _Data(), []
+    for mesh in header.get("meshes", []):
+        primitives = [reader.arrays(each) for each in mesh["primitives"]]
+        meshes.append({"primitives": [data.primitive(*each) for each in primitives if each]})
+    nodes = [{key: node[key] for key in _KEPT if key in node} for node in header.get("nodes", [])]
+    kept: Header = {key: header[key] for key in ("asset", "scene", "scenes") if key in header}
+    return data.glb({**kept, "nodes": nodes, "meshes": meshes})
+
+
+def opened_gltf(content: bytes, beside: ReadBeside, name: str) -> tuple[Header, GltfReader]:
+    """The header of a glTF file, which is checked, and what reads its triangles.
+
+    Raises what `plain_gltf` raises.
+    """
     header, binary = _parts(content)
     _require_known(header.get("extensionsRequired", []), name)
     _require_at_rest(header, name)
     _require_tree(header.get("nodes", []))
-    reader = _Reader(header, binary, beside, name)
+    reader = GltfReader(header, binary, beside, name)
     reader.require_proportion(len(content))
-    data, meshes = _Data(), []
-    for mesh in header.get("meshes", []):
-        primitives = [reader.triangles(each, data) for each in mesh["primitives"]]
-        meshes.append({"primitives": [each for each in primitives if each is not None]})
-    nodes = [{key: node[key] for key in _KEPT if key in node} for node in header.get("nodes", [])]
-    kept: Header = {key: header[key] for key in ("asset", "scene", "scenes") if key in header}
-    return data.glb({**kept, "nodes": nodes, "meshes": meshes})
+    return header, reader
 
 
 def _parts(content: bytes) -> tuple[Header, bytes]:
@@ -164,6 +175,13 @@ class _Data:
         self._bytes += content
         return len(self._accessors) - 1
 
+    def primitive(self, positions: NDArray[Any], corners: NDArray[Any], mode: int) -> Header:
+        return {
+            "attributes": {"POSITION": self.add(positions, _FLOAT, "VEC3")},
+            "indices": self.add(corners, _UINT32, "SCALAR"),
+            "mode": mode,
+        }
+
     def glb(self, header: Header) -> bytes:
         buffers = [{"byteLength": len(self._bytes)}]
         tables = {"accessors": self._accessors, "bufferViews": self._views, "buffers": buffers}
@@ -174,7 +192,9 @@ class _Data:
         return start + text + struct.pack("<I4s", len(self._bytes), _BINARY) + self._bytes
 
 
-class _Reader:
+class GltfReader:
+    """Triangles of primitives."""
+
     def __init__(self, header: Header, binary: bytes, beside: ReadBeside, name: str) -> None:
         self._header, self._binary, self._beside, self._name = header, binary, beside, name
         self._read: dict[str, bytes] = {}
@@ -192,7 +212,7 @@ class _Reader:
             )
         for number, mesh in enumerate(self._header.get("meshes", [])):
             for primitive in mesh["primitives"]:
-                if primitive.get("mode", _TRIANGLES) in _CORNERS:
+                if primitive.get("mode", TRIANGLES) in _CORNERS:
                     taken += max(uses[number], 1) * self._bytes_of(primitive, accessors)
         there = length + sum(map(len, self._read.values()))
         if taken > SHARED_BYTES + GROWTH * there:
@@ -210,12 +230,12 @@ class _Reader:
                 raise ValueError(f"found {each['count']} {each['type']}, expected some {kind}")
             if "bufferView" in each:
                 self._buffer(self._header["bufferViews"][each["bufferView"]])
-        corners = _CORNERS[primitive.get("mode", _TRIANGLES)] * int(used[-1]["count"])
+        corners = _CORNERS[primitive.get("mode", TRIANGLES)] * int(used[-1]["count"])
         return _POSITION_BYTES * int(used[0]["count"]) + _CORNER_BYTES * corners
 
-    def triangles(self, primitive: Header, data: _Data) -> Header | None:
-        """The primitive as triangles, whose values go into `data`; None of points and lines."""
-        mode = primitive.get("mode", _TRIANGLES)
+    def arrays(self, primitive: Header) -> tuple[NDArray[Any], NDArray[Any], int] | None:
+        """Positions (p, 3), corners (k,) and mode: `TRIANGLES` or `STRIP`; None of lines."""
+        mode = primitive.get("mode", TRIANGLES)
         if mode not in _CORNERS:
             return None
         extensions = list(primitive.get("extensions", {}))
@@ -225,12 +245,8 @@ class _Reader:
             corners = self._values(primitive["indices"], extensions).ravel().astype(np.int64)
         if mode == _FAN:
             fan = np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], 1)
-            mode, corners = _TRIANGLES, fan.ravel()
-        return {
-            "attributes": {"POSITION": data.add(positions, _FLOAT, "VEC3")},
-            "indices": data.add(corners, _UINT32, "SCALAR"),
-            "mode": mode,
-        }
+            mode, corners = TRIANGLES, fan.ravel()
+        return positions, corners, mode
 
     def _values(self, index: int, extensions: list[str]) -> NDArray[Any]:
         """Rows (n, columns) of an accessor."""

@@ -8,6 +8,7 @@ or they hold less than they say.
 
 import codecs
 import re
+from collections.abc import Iterator
 
 from carillon.errors import UserError
 
@@ -52,20 +53,26 @@ def plain_obj(content: bytes) -> bytes:
         return content
     vertices: list[str] = []
     faces: list[str] = []
-    for line in _ENDS.split(_GOES_ON.sub(" ", content.decode("latin-1"))):
-        keyword, *words = line.partition("#")[0].split() or [""]
+    for keyword, words in obj_lines(content):
         if keyword == "v":
             if len(words) < 3:
                 raise ValueError("a vertex does not have three coordinates")
             vertices.append(f"v {' '.join(words[:3])}\n")
         elif keyword == "f":
-            corners = [_number(word, len(vertices)) for word in words]
+            corners = [vertex_number(word, len(vertices)) for word in words]
             fan = zip(corners[1:], corners[2:])
             faces += [f"f {corners[0]} {second} {third}\n" for second, third in fan]
     return "".join([*vertices, *faces]).encode("latin-1")
 
 
-def _number(word: str, count: int) -> int:
+def obj_lines(content: bytes) -> Iterator[tuple[str, list[str]]]:
+    """Keyword and words of each line of an OBJ file, in which a byte is a character (Latin-1)."""
+    for line in _ENDS.split(_GOES_ON.sub(" ", content.decode("latin-1"))):
+        keyword, *words = line.partition("#")[0].split() or [""]
+        yield keyword, words
+
+
+def vertex_number(word: str, count: int) -> int:
     """Number, from 1, of the vertex that a face's "v/vt/vn" names after `count` of them."""
     index = int(word.partition("/")[0])
     if index == 0 or index < -count:

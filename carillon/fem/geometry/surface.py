@@ -3,6 +3,8 @@
 import codecs
 import logging
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -18,17 +20,20 @@ from carillon.fem.geometry.builtin import builtin_surface
 from carillon.fem.geometry.gltf import plain_gltf
 from carillon.fem.geometry.orientation import turned_alike
 from carillon.fem.geometry.plain_files import obj_of_off, plain_obj, require_plain_ply, whole_stl
+from carillon.fem.geometry.scene_parts import Part, gltf_parts, obj_parts
+from carillon.fem.geometry.three_mf import three_mf_parts
+from carillon.fem.geometry.volume_files import READERS, is_volume_file, read_volume_mesh
 from carillon.files.paths import require_file
 from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
 
 # A box thinner than this fraction of its longest side holds no solid that voxels could show.
 FLATNESS = 1e-6
 
-FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl", "stl_ascii")
-"""Endings of mesh files.
+FORMATS = ("3mf", "glb", "gltf", "obj", "off", "ply", "stl", "stl_ascii")
+"""Endings of files of surfaces; those of volume elements are `volume_files.READERS`.
 
 Of others that trimesh reads, depending on what else is installed, a few bytes may stand for any
-number: archives (zip, 3mf), parts that hold each other (3mf, dae), entities (xaml, dae).
+number: archives (zip), parts that hold each other (dae), entities (xaml, dae).
 """
 
 
@@ -45,7 +50,8 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     ----------
     mesh
         Path of a file in one of `FORMATS` (obj, stl, ply, off, glb, ...; the objects of a scene are
-        concatenated), or ``builtin:NAME`` for a built-in object.
+        concatenated), of a mesh with volume elements (msh, vtu, ...), whose outer faces are the
+        surface, or ``builtin:NAME`` for a built-in object.
     unit
         Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
         them it is a scale factor.
@@ -56,11 +62,7 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     >>> bool((surface.extents > load_surface("builtin:bell").extents).all())
     True
     """
-    if not UNITS[0] <= unit <= UNITS[1]:
-        raise UserError(
-            f"unit {unit:g}: expected a positive number of metres per mesh unit, {UNITS[0]:g} to "
-            f"{UNITS[1]:g}"
-        )
+    _require_unit(unit)
     if mesh.startswith(BUILTIN_PREFIX):
         surface = builtin_surface(mesh.removeprefix(BUILTIN_PREFIX))
     else:
@@ -73,12 +75,41 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     return surface
 
 
+def parts_of_scene(mesh: str) -> list[Part] | None:
+    """Parts of a file that has such by name, their coordinates those of the file; None of others.
+
+    Raises UserError, see `load_surface`.
+    """
+    path = Path(mesh)
+    kind = path.suffix.lstrip(".").lower()
+    if mesh.startswith(BUILTIN_PREFIX) or kind not in ("3mf", "glb", "gltf", "obj"):
+        return None
+    _require_mesh_file(path)
+    content = path.read_bytes()
+    with _in_one_sentence(path):
+        match kind:
+            case "3mf":
+                return three_mf_parts(content, mesh)
+            case "obj":
+                return obj_parts(content.removeprefix(codecs.BOM_UTF8))
+            case _:
+                return gltf_parts(content, Beside(path).get, mesh)
+
+
 def surface_of_triangles(vertices: ArrayLike, faces: ArrayLike, name: str) -> trimesh.Trimesh:
     """A surface [m] of vertices (v, 3) and triangles (f, 3), checked as those of files are.
 
     Raises UserError if arrays have other shapes or faces name vertices that are not there, and for
     what `load_surface` refuses of coordinates and faces.
     """
+    return checked_surface(vertices, faces, name, 1.0)
+
+
+def checked_surface(
+    vertices: ArrayLike, faces: ArrayLike, name: str, unit: float
+) -> trimesh.Trimesh:
+    """The same of vertices in a `unit` [m]."""
+    _require_unit(unit)
     try:
         surface = trimesh.Trimesh(np.asarray(vertices), np.asarray(faces), process=False)
         _require_vertices(surface)
@@ -86,8 +117,11 @@ def surface_of_triangles(vertices: ArrayLike, faces: ArrayLike, name: str) -> tr
         raise UserError(f"{name}: {error}") from None
     if not len(surface.faces):
         raise UserError(f"{name}: has no faces, expected the triangles of a surface")
-    _require_solid(name, surface, 1.0)
-    return _turned_alike(name, surface)
+    _require_solid(name, surface, unit)
+    surface = _turned_alike(name, surface)
+    if unit != 1.0:
+        surface.apply_scale(unit)
+    return surface
 
 
 def surface_name(mesh: str) -> str:
@@ -100,7 +134,25 @@ _PLY_LENGTH = "PLY is unexpected length"
 
 
 def _read(path: Path) -> trimesh.Trimesh:
+    if is_volume_file(path):
+        return read_volume_mesh(path).surface
     _require_mesh_file(path)
+    with _in_one_sentence(path):
+        loaded = _loaded(path)
+        if isinstance(loaded, trimesh.Scene):
+            loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
+        if isinstance(loaded, trimesh.Trimesh):
+            _require_vertices(loaded)
+    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
+        raise UserError(
+            f"{path}: has no faces, expected the triangles of a surface; export it as a mesh"
+        )
+    return loaded
+
+
+@contextmanager
+def _in_one_sentence(path: Path) -> Iterator[None]:
+    """Make one UserError of whatever a parser raises."""
     # trimesh logs warnings about odd files; the person gets one sentence instead.
     logger = logging.getLogger("trimesh")
     level = logger.level
@@ -108,11 +160,7 @@ def _read(path: Path) -> trimesh.Trimesh:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            loaded = _loaded(path)
-            if isinstance(loaded, trimesh.Scene):
-                loaded = loaded.to_geometry() if loaded.geometry else trimesh.Trimesh()
-            if isinstance(loaded, trimesh.Trimesh):
-                _require_vertices(loaded)
+            yield
     except UserError:
         raise
     except Exception as error:  # parsers of a dozen formats raise anything
@@ -127,11 +175,6 @@ def _read(path: Path) -> trimesh.Trimesh:
         ) from None
     finally:
         logger.setLevel(level)
-    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
-        raise UserError(
-            f"{path}: has no faces, expected the triangles of a surface; export it as a mesh"
-        )
-    return loaded
 
 
 def _loaded(path: Path) -> Any:
@@ -149,6 +192,10 @@ def _loaded(path: Path) -> Any:
                 content, kind = plain_obj(written), "obj"
         case "obj":
             content = plain_obj(path.read_bytes().removeprefix(codecs.BOM_UTF8))
+        case "3mf":
+            parts = three_mf_parts(path.read_bytes(), str(path))
+            surfaces = [trimesh.Trimesh(each.vertices, each.faces, process=False) for each in parts]
+            return trimesh.util.concatenate(surfaces) if surfaces else trimesh.Trimesh()
         case "gltf" | "glb":
             content, kind = plain_gltf(path.read_bytes(), Beside(path).get, str(path)), "glb"
     if content is None:
@@ -156,12 +203,20 @@ def _loaded(path: Path) -> Any:
     return trimesh.load(BytesIO(content), file_type=kind, resolver=nothing, process=False)
 
 
+def _require_unit(unit: float) -> None:
+    if not UNITS[0] <= unit <= UNITS[1]:
+        raise UserError(
+            f"unit {unit:g}: expected a positive number of metres per mesh unit, {UNITS[0]:g} to "
+            f"{UNITS[1]:g}"
+        )
+
+
 def _require_mesh_file(path: Path) -> None:
-    require_file(path, "a mesh (obj, stl, ply, off, glb or gltf) or builtin:NAME")
+    require_file(path, "a mesh (obj, stl, ply, off, glb, gltf, 3mf, msh, vtu, ...) or builtin:NAME")
     if path.suffix.lstrip(".").lower() not in FORMATS:
         raise UserError(
             f"{path}: the mesh format {path.suffix or '(no ending)'!r} is not read; convert the "
-            f"mesh to one of {', '.join(FORMATS)}"
+            f"mesh to one of {', '.join((*FORMATS, *READERS))}"
         )
     size = path.stat().st_size
     if size > MESH_BYTES:

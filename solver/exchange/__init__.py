@@ -1,0 +1,1 @@
+"""Modes and matrices in the files of other programs."""
