@@ -89,6 +89,10 @@ class Elements(ABC):
         return matrices
 
     @abstractmethod
+    def moduli_of(self, chosen: Flags) -> Array:
+        """Moduli like `young` at the points of chosen regions (r,), 0 at others."""
+
+    @abstractmethod
     def _stiffness(self, chosen: Chosen) -> Array:
         """Stiffness without supports."""
 
@@ -158,6 +162,10 @@ class HexElements(Elements):
         if self.kinds is None:
             return weights
         return np.einsum("pk,pkj->pj", weights, node_weights()[self.kinds[elements]])
+
+    def moduli_of(self, chosen: Flags) -> Array:
+        there = chosen[0] if self.region is None else chosen[self.region]
+        return np.asarray(np.where(there, self.young, 0.0))
 
     def _stiffness(self, chosen: Chosen) -> Array:
         stiffness = self._uniform_edges(chosen)

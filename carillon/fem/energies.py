@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.fem.elements import Elements
-from carillon.fem.finite_cells.model import CellElements
 from carillon.fem.model import Solid
 
 ENTRIES_AT_ONCE = 1 << 23
@@ -39,18 +38,9 @@ def energy_shares(
         doubled = elements.regions.density * np.where(group == number, 2.0, 1.0)
         heavier = elements.with_regions(replace(elements.regions, density=doubled))
         mass[:, number] = _products(heavier, free.connectivity, modes, mass=True) - whole
-        own = elements.with_young(_moduli_of(elements, group == number))
+        own = elements.with_young(elements.moduli_of(group == number))
         stiffness[:, number] = _products(own, free.connectivity, modes, mass=False) / eigenvalues
     return mass, stiffness
-
-
-def _moduli_of(elements: Elements, chosen: NDArray[np.bool_]) -> Array:
-    """Moduli at the elements' points where they are of chosen regions (r,), else 0."""
-    law = elements.law if isinstance(elements, CellElements) else getattr(elements, "region", None)
-    there = chosen[0] if law is None else chosen[law]
-    if isinstance(elements, CellElements) and law is not None:
-        there = there[:, :, None]
-    return np.asarray(np.where(there, elements.young, 0.0))
 
 
 def _products(elements: Elements, nodes: NDArray[np.integer], modes: Array, *, mass: bool) -> Array:

@@ -32,7 +32,7 @@ Law = float | Elasticity
 
 
 @dataclass(frozen=True)
-class Part:
+class RegionElements:
     """Elements that hold some of a region: a row of the table, and which elements (r,)."""
 
     region: int
@@ -46,7 +46,7 @@ class AnalysedElements(ABC):
     """
 
     model: Solid
-    parts: list[Part]
+    parts: list[RegionElements]
 
     def with_young(self, young: Array) -> Solid:
         """The solid with these moduli."""
@@ -145,12 +145,12 @@ class _FineElements(AnalysedElements):
         return np.ascontiguousarray(factors.transpose(0, 2, 1))
 
 
-def _parts(model: ElasticModel) -> list[Part]:
+def _parts(model: ElasticModel) -> list[RegionElements]:
     region = model.region
     if region is None:
-        return [Part(0, slice(None))]
+        return [RegionElements(0, slice(None))]
     return [
-        Part(int(number), np.flatnonzero((region == number).any(axis=1)))
+        RegionElements(int(number), np.flatnonzero((region == number).any(axis=1)))
         for number in np.unique(region)
     ]
 
@@ -211,15 +211,15 @@ class _CellElements(AnalysedElements):
         )
         elements = self.model.elements
         self._slots: list[Index] = []
-        self.parts: list[Part] = []
+        self.parts: list[RegionElements] = []
         if elements.law is None:
-            self.parts.append(Part(0, slice(None)))
+            self.parts.append(RegionElements(0, slice(None)))
             return
         there = elements.shares.any(axis=2)
         for number in np.unique(elements.law):
             cell, slot = np.nonzero(there & (elements.law == number))
             self._slots.append(slot)
-            self.parts.append(Part(int(number), cell))
+            self.parts.append(RegionElements(int(number), cell))
 
     def slopes(self, young: Array, directions: Array) -> list[Array]:
         if self.model.region is None:

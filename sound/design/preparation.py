@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Surface
 from carillon.composition.composition import PlacedRegions
-from carillon.composition.entries import CompositionEntry, compose
+from carillon.composition.entries import CompositionEntry, SolidFrame, compose
 from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem.elasticity import Elasticity
@@ -115,7 +115,8 @@ def prepared_solid(
     mesh, cells = discretised(loaded, solid)
     loaded.doubt_unit()
     finite = None if cells is None else cells.cells
-    composed = compose(composition or CompositionEntry(), loaded.triangles, loaded.name)
+    frame = SolidFrame(solid.mesh, loaded.triangles, loaded.name, solid.unit)
+    composed = compose(composition or CompositionEntry(), frame)
     table, placed = Regions.one(solid.poisson, solid.density), None
     young: float | Array = material.young
     if composed.composition is not None:

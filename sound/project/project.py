@@ -186,5 +186,7 @@ def _in_folder(project: Project, folder: Path) -> Project:
 
 
 def _region_in_folder(region: RegionEntry, folder: Path) -> RegionEntry:
-    is_file = region.mesh is not None and not region.mesh.startswith(BUILTIN_PREFIX)
-    return replace(region, mesh=str(folder / str(region.mesh))) if is_file else region
+    def there(file: str | None) -> str | None:
+        return file if file is None or file.startswith(BUILTIN_PREFIX) else str(folder / file)
+
+    return replace(region, mesh=there(region.mesh), labels=there(region.labels))

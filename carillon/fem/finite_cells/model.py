@@ -89,6 +89,10 @@ class CellElements(Elements):
             found.append((int(number), cell, young[cell, slot]))
         return found
 
+    def moduli_of(self, chosen: Flags) -> Array:
+        there = chosen[0] if self.law is None else chosen[self.law][:, :, None]
+        return np.asarray(np.where(there, self.young, 0.0))
+
     def _stiffness(self, chosen: Chosen) -> Array:
         edges = self.edges(chosen)
         parts = self.by_law(chosen)
