@@ -110,8 +110,9 @@ class DampingSettings:
 
     source: Dampings = option(
         "clips",
-        "where the dampings that sound come from, clips or material; the latter are those of loss "
-        "factors that are found after the search and come as near to the clips' as they can",
+        "where the dampings that sound come from, clips or material; the latter are those of the "
+        "regions if they are known, else those of loss factors that are found after the search and "
+        "come as near to the clips' as they can",
     )
     regions: Annotated[int, between(1, 100)] = option(
         4, "regions of the solid that have a loss factor each [1]"
