@@ -27,7 +27,11 @@ WOOD = [REGIONS[0], {"name": "end", "material": "beech", "grain": [1, 0, 0], "wh
 HELD = [{"where": "x < -0.11"}]
 CASES = {
     "voxels": {"regions": REGIONS},
-    "held": {"regions": REGIONS, "supports": HELD},
+    "held": {
+        "regions": REGIONS,
+        "supports": HELD,
+        "material": {"dimensions": 10, "young_bounds": [1e7, 1e10]},
+    },
     "coarse": {"regions": REGIONS, "supports": HELD, "coarsen": "ddfem"},
     "cells": {"regions": WOOD, "supports": HELD, "discretisation": "finite-cell", "resolution": 10},
     "loaded": {
@@ -221,3 +225,22 @@ def test_modes_files_of_regions_are_heard_with_their_dampings(tmp_path, capsys, 
 
     iron, beech = by("iron"), by("beech")
     assert (iron < mixed).all() and (mixed < beech).all()
+
+
+def test_regions_of_a_call_are_those_of_a_project(tmp_path, monkeypatch):
+    import carillon as ca
+
+    monkeypatch.chdir(tmp_path)
+    made = project(tmp_path, "held")
+    small_project.write_clips(tmp_path, small_project.targets(made).frequencies)
+    keys = {**small_project.PROJECT, "modes": 4, "optimiser": {"evaluations": 1, "workers": 1}}
+    keys["optimiser"]["seconds"] = None
+    regions = [ca.Region(**each) for each in REGIONS]
+    supports = [ca.Support(**each) for each in HELD]
+    one = ca.design(**keys, regions=regions, supports=supports)
+    other = ca.design(**keys, regions=REGIONS, supports=HELD)
+    assert one.found.settings == other.found.settings
+    np.testing.assert_array_equal(one.frequencies, other.frequencies)
+    chosen = ca.Region("end", where=lambda points: points[:, 0] > 0.0)
+    with pytest.raises(UserError, match="'end': where is a function"):
+        ca.design(**keys, regions=[REGIONS[0], chosen])

@@ -1,6 +1,6 @@
 """Modes of a solid as functions of its material's coordinates, with derivatives."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,7 +31,13 @@ from sound.design.masses import SolidModes, by_density, nodal_mass
 from sound.design.material import FIRST, SECOND, ReducedMaterial, elasticity_slope
 from sound.design.modal_truncation import lies_between, outside_response, shift_between
 from sound.design.objective import Sensitivity
-from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
+from sound.design.sensitivity import (
+    LawElements,
+    all_pairs,
+    close_pairs,
+    inside_response,
+    projected_stiffness,
+)
 from sound.strikes import Strike
 
 TOLERANCE = 1e-3
@@ -165,16 +171,17 @@ class Simulation:
         pairs = all_pairs(len(values)) if whole else close_pairs(values)
         # The moduli at the points are linear in a common factor.
         moduli = self.elements.slopes(young, young[:, None]) if free.poisson else slopes
-        inside, beyond = np.zeros((0, 0)), np.zeros((0, 0, 0))
-        for number, part in enumerate(self.elements.parts):
-            strains, own = self.elements.strains(regions.laws[part.region]), slopes[number]
-            if any(part.region in each.rows for each in free.poisson):
-                strains, own = self._with_slope_of_poisson(
-                    part.region, regions, strains, own, moduli[number]
-                )
-            nodes = self.model.connectivity[part.cells]
-            found = projected_stiffness(nodes, strains, vectors, pairs, others, own)
-            inside, beyond = found if not number else (inside + found[0], beyond + found[1])
+        parts = self._parts(regions, slopes)
+        if free.poisson:
+            moves = {row for each in free.poisson for row in each.rows}
+            parts = (
+                self._with_slope_of_poisson(part.region, regions, own, at_points)
+                if part.region in moves
+                else own
+                for part, own, at_points in zip(self.elements.parts, parts, moduli)
+            )
+        size = self.material.dimensions
+        inside, beyond = projected_stiffness(parts, vectors, pairs, others, size)
         if free.density:
             self._add_densities(evaluation, regions, pairs, vectors, others, inside, beyond)
         return Sensitivity(pairs, inside, beyond)
@@ -184,13 +191,14 @@ class Simulation:
         return self.material.regions(z, self.model.regions)
 
     def _with_slope_of_poisson(
-        self, row: int, regions: Regions, strains: Array, slopes: Array, moduli: Array
-    ) -> tuple[Array, Array]:
-        """Strains and slopes of a region's elements with those of Poisson's ratio added.
+        self, row: int, regions: Regions, part: LawElements, moduli: Array
+    ) -> LawElements:
+        """A region's elements with strains and slopes of Poisson's ratio added.
 
         The derivative of the stiffness by Poisson's ratio is a combination of the stiffnesses at
         two other ratios, whose strains are added as further points.
         """
+        nodes, strains, slopes = part
         poisson = regions.laws[row].poisson
         assert poisson is not None
         free = next(each.number for each in self.material.free.poisson if row in each.rows)
@@ -200,7 +208,14 @@ class Simulation:
         for place, weight in enumerate(elasticity_slope(poisson), start=1):
             by_cell[:, place, :, self.material.moving] = free.slope(poisson) * weight * by_point
         further = [self.elements.strains(ratio) for ratio in (FIRST, SECOND)]
-        return np.concatenate([strains, *further]), by_cell.reshape(-1, slopes.shape[1])
+        together = np.concatenate([strains, *further])
+        return LawElements(nodes, together, by_cell.reshape(-1, slopes.shape[1]))
+
+    def _parts(self, regions: Regions, slopes: Sequence[Array]) -> Iterator[LawElements]:
+        """The elements by region, with the derivatives of their moduli."""
+        for part, own in zip(self.elements.parts, slopes, strict=True):
+            nodes = self.model.connectivity[part.cells]
+            yield LawElements(nodes, self.elements.strains(regions.laws[part.region]), own)
 
     @cached_property
     def _masses(self) -> list[sp.csr_matrix]:
@@ -241,17 +256,12 @@ class Simulation:
         own = young[:, None] * (regions[:, None] == np.arange(regions.max() + 1))
         vectors = self.mesh_rows(evaluation.modes.elastic)
         count = vectors.shape[1]
-        materials = self.regions(evaluation.z)
-        energies = sum(
-            projected_stiffness(
-                self.model.connectivity[part.cells],
-                self.elements.strains(materials.laws[part.region]),
-                vectors,
-                all_pairs(count)[:count],
-                np.empty((len(vectors), 0, count)),
-                slopes,
-            )[0]
-            for part, slopes in zip(self.elements.parts, self.elements.slopes(young, own))
+        energies, _ = projected_stiffness(
+            self._parts(self.regions(evaluation.z), self.elements.slopes(young, own)),
+            vectors,
+            all_pairs(count)[:count],
+            np.empty((len(vectors), 0, count)),
+            own.shape[1],
         )
         return np.asarray((energies / evaluation.eigenvalues).T)
 

@@ -105,7 +105,7 @@ class CellElements(Elements):
             matrices *= edges
         return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
 
-    @property
+    @cached_property
     def share(self) -> Array:
         """(c, 125) weighted densities at the points, over that of the first region."""
         return self._share(slice(None))
