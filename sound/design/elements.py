@@ -11,13 +11,14 @@ from carillon.arrays import Array, Index
 from carillon.composition.composition import PlacedRegions
 from carillon.errors import UserError
 from carillon.fem.elasticity import Elasticity
-from carillon.fem.element import quadrature_stiffness
+from carillon.fem.element import matrix_of, quadrature_stiffness
 from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.kinks import Borders
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.finite_cells.shapes import POINTS, strain_factors
 from carillon.fem.geometry import HexMesh, blocks_from_mesh
 from carillon.fem.model import ElasticModel, Solid, fine_model
-from carillon.fem.regions import Regions
+from carillon.fem.regions import RegionOf, Regions
 from carillon.fem.supports import Supports
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
@@ -37,6 +38,9 @@ class RegionElements:
 
     region: int
     cells: Index | slice
+    kink: tuple[int, int] | None = None
+    """Number and side of the kink of a cell that has one, see
+    `carillon.fem.finite_cells.kinks.Kinks`."""
 
 
 class AnalysedElements(ABC):
@@ -65,8 +69,8 @@ class AnalysedElements(ABC):
         """
 
     @abstractmethod
-    def strains(self, law: Law) -> Array:
-        """Matrices B (p, 6, 3 k); the stiffness of modulus 1 at point p is B_p^T B_p."""
+    def strains(self, part: RegionElements, law: Law) -> Array:
+        """Matrices B (p, 6, 3 k) of a part; the stiffness of modulus 1 at point p is B_p^T B_p."""
 
 
 def analysed_elements(
@@ -138,7 +142,7 @@ class _FineElements(AnalysedElements):
             for part in self.parts
         ]
 
-    def strains(self, law: Law) -> Array:
+    def strains(self, part: RegionElements, law: Law) -> Array:
         values, vectors = np.linalg.eigh(quadrature_stiffness(law))
         factors = np.sqrt(np.maximum(values, 0.0))[:, None, :] * vectors
         factors = np.sqrt(self.model.mesh.edge) * factors[:, :, -STRAINS:]
@@ -216,10 +220,22 @@ class _CellElements(AnalysedElements):
             self.parts.append(RegionElements(0, slice(None)))
             return
         there = elements.shares.any(axis=2)
+        if elements.kinks is not None:
+            self._add_kinks(elements.kinks.borders, elements.law)
+            there[elements.kinks.borders.cell] = False
         for number in np.unique(elements.law):
             cell, slot = np.nonzero(there & (elements.law == number))
-            self._slots.append(slot)
-            self.parts.append(RegionElements(int(number), cell))
+            if len(cell):
+                self._slots.append(slot)
+                self.parts.append(RegionElements(int(number), cell))
+
+    def _add_kinks(self, borders: Borders, law: RegionOf) -> None:
+        """Add the two sides of each cell that has a kink, whose strains are its own."""
+        for number, cell in enumerate(borders.cell):
+            for side, region in enumerate(borders.region[number]):
+                self._slots.append(np.flatnonzero(law[cell] == region)[:1])
+                own = np.array([cell])
+                self.parts.append(RegionElements(int(region), own, (number, side)))
 
     def slopes(self, young: Array, directions: Array) -> list[Array]:
         if self.model.region is None:
@@ -233,5 +249,10 @@ class _CellElements(AnalysedElements):
                 own[:, column] = moduli[part.cells, slot].ravel()
         return found
 
-    def strains(self, law: Law) -> Array:
-        return np.sqrt(2.0 * self.model.mesh.edge) * strain_factors(law)
+    def strains(self, part: RegionElements, law: Law) -> Array:
+        scale = np.sqrt(2.0 * self.model.mesh.edge)
+        kinks = self.model.elements.kinks
+        if part.kink is None or kinks is None:
+            return scale * strain_factors(law)
+        root = np.linalg.cholesky(matrix_of(law)).T
+        return np.asarray(scale * (root @ kinks.whole_strains(*part.kink)))

@@ -26,7 +26,7 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
 from solver.linear import Inverse, Lasting
 from solver.response.points import forces_at
-from sound.design.elements import analysed_elements
+from sound.design.elements import RegionElements, analysed_elements
 from sound.design.masses import SolidModes, by_density, nodal_mass
 from sound.design.material import FIRST, SECOND, ReducedMaterial, elasticity_slope
 from sound.design.modal_truncation import lies_between, outside_response, shift_between
@@ -175,7 +175,7 @@ class Simulation:
         if free.poisson:
             moves = {row for each in free.poisson for row in each.rows}
             parts = (
-                self._with_slope_of_poisson(part.region, regions, own, at_points)
+                self._with_slope_of_poisson(part, regions, own, at_points)
                 if part.region in moves
                 else own
                 for part, own, at_points in zip(self.elements.parts, parts, moduli)
@@ -191,15 +191,15 @@ class Simulation:
         return self.material.regions(z, self.model.regions)
 
     def _with_slope_of_poisson(
-        self, row: int, regions: Regions, part: LawElements, moduli: Array
+        self, part: RegionElements, regions: Regions, own: LawElements, moduli: Array
     ) -> LawElements:
         """A region's elements with strains and slopes of Poisson's ratio added.
 
         The derivative of the stiffness by Poisson's ratio is a combination of the stiffnesses at
         two other ratios, whose strains are added as further points.
         """
-        nodes, strains, slopes = part
-        poisson = regions.laws[row].poisson
+        nodes, strains, slopes = own
+        row, poisson = part.region, regions.laws[part.region].poisson
         assert poisson is not None
         free = next(each.number for each in self.material.free.poisson if row in each.rows)
         by_point = moduli.reshape(-1, len(strains))
@@ -207,7 +207,7 @@ class Simulation:
         by_cell[:, 0] = slopes.reshape(len(by_point), len(strains), -1)
         for place, weight in enumerate(elasticity_slope(poisson), start=1):
             by_cell[:, place, :, self.material.moving] = free.slope(poisson) * weight * by_point
-        further = [self.elements.strains(ratio) for ratio in (FIRST, SECOND)]
+        further = [self.elements.strains(part, ratio) for ratio in (FIRST, SECOND)]
         together = np.concatenate([strains, *further])
         return LawElements(nodes, together, by_cell.reshape(-1, slopes.shape[1]))
 
@@ -215,7 +215,8 @@ class Simulation:
         """The elements by region, with the derivatives of their moduli."""
         for part, own in zip(self.elements.parts, slopes, strict=True):
             nodes = self.model.connectivity[part.cells]
-            yield LawElements(nodes, self.elements.strains(regions.laws[part.region]), own)
+            law = regions.laws[part.region]
+            yield LawElements(nodes, self.elements.strains(part, law), own)
 
     @cached_property
     def _masses(self) -> list[sp.csr_matrix]:

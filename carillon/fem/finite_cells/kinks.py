@@ -136,6 +136,14 @@ class Kinks:
         """Strains (c, 2, 125, 6, 9) of the kinks at the points, see `Borders.strains`."""
         return self.borders.strains(chosen) - self.mean[chosen, None, None]
 
+    def whole_strains(self, number: int, side: int) -> Array:
+        """Strains (125, 6, 81) at the points on one side of a cell, by displacements of the nodes.
+
+        Kinks are in them.
+        """
+        strains = self.strains(np.array([number]))[0, side]
+        return np.asarray(self._nodes + strains @ self.follow[number])
+
     def _products(self, chosen: Index, moduli: Array) -> tuple[Array, Array]:
         """Stiffness between kinks (c, 9, 9), and between them and nodes (c, 9, 81)."""
         strains = self.strains(chosen)

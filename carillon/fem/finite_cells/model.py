@@ -117,10 +117,15 @@ class CellElements(Elements):
             matrices *= edges
         return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
 
+    def with_regions(self, regions: Regions) -> Self:
+        # How kinks follow the nodes stays as it is.
+        kinks = None if self.kinks is None else replace(self.kinks, regions=regions)
+        return replace(self, regions=regions, kinks=kinks)
+
     def _add_kinks(self, chosen: Chosen, matrices: Array) -> None:
         if self.kinks is None or self.kink is None or self.law is None:
             return
-        kink = self.kink[chosen]
+        kink = self.kink[chosen].astype(np.int64)
         own = np.flatnonzero(kink >= 0)
         if len(own):
             young, law = self.young[chosen][own], self.law[chosen][own]
