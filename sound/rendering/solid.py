@@ -12,6 +12,7 @@ from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
 from solver.files.modes_file import ModesFile
 from solver.response.points import motion_at
+from solver.response.region_damping import ModalDamping
 from solver.response.response import Damping
 from solver.subspace.weyl import clusters
 from sound.project.design import Design
@@ -39,14 +40,18 @@ class SoundingSolid:
         return cls(design.frequencies, design.dampings, design.model, design.elastic_modes)
 
     @classmethod
-    def of_modes(cls, file: ModesFile, damping: Damping) -> SoundingSolid:
+    def of_modes(cls, file: ModesFile, damping: Damping | ModalDamping) -> SoundingSolid:
         """A solid of any modes file with Rayleigh damping; see `damped`."""
         assert file.modes is not None
         return cls.damped(file.model, file.eigenvalues, file.modes, damping)
 
     @classmethod
     def damped(
-        cls, model: Solid, eigenvalues: Array, modes: Array, damping: Damping
+        cls,
+        model: Solid,
+        eigenvalues: Array,
+        modes: Array,
+        damping: Damping | ModalDamping,
     ) -> SoundingSolid:
         """A solid with Rayleigh damping, without rigid modes and overdamped ones.
 

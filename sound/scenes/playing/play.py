@@ -64,9 +64,7 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
         course,
         impacts,
         contacts,
-        sustained_forces(
-            contacts, bodies, ground.material, seconds, engine, settings.rate, scene.seed, threads
-        ),
+        sustained_forces(contacts, seconds, engine, settings.rate, scene.seed, threads),
         gains_of(bodies, settings.radiation, threads),
         head_of(scene.listener, camera),
         settings,
