@@ -196,7 +196,7 @@ def _cut(
 ) -> tuple[Array, Index]:
     """Halve edges longer than `longest` in all triangles that share them, until there are none.
 
-    Those between points of one part stay.
+    Those of triangles of one part stay.
     """
     while True:
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
@@ -205,8 +205,11 @@ def _cut(
         first, second = vertices[edges[:, 0]], vertices[edges[:, 1]]
         long = np.linalg.norm(second - first, axis=1) > longest
         if parts_of is not None:
-            part = parts_of(vertices, faces)
-            long &= part[edges[:, 0]] != part[edges[:, 1]]
+            part = parts_of(vertices, faces)[faces]
+            mixed = (part != part[:, :1]).any(axis=1)
+            of_mixed = np.zeros(len(edges), dtype=bool)
+            of_mixed[of_sides.reshape(-1, 3)[mixed]] = True
+            long &= of_mixed
         if not long.any():
             return vertices, faces
         middles = np.full(len(edges), -1)

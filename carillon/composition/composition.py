@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from carillon.composition.domains import ClosedSurface, Domain, Placement
+from carillon.composition.domains import ClosedSurface, Domain, Everywhere, Placement
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells, centroids
 from carillon.fem.finite_cells.kinks import Borders
@@ -86,7 +86,9 @@ class Composition:
 
     @property
     def _is_one(self) -> bool:
-        return len(self._parts) == 1 and not callable(self._parts[0].axes)
+        first = self._parts[0]
+        alike = isinstance(first.place, Everywhere) and not callable(first.axes)
+        return len(self._parts) == 1 and alike
 
     def parts_at(self, points: Array) -> Index:
         """Number (p,) of the part that each of some points (p, 3) [m] of the solid is of.

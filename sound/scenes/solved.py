@@ -16,7 +16,7 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
-from carillon.fem.model import ElasticModel, Solid
+from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from carillon.files.cache import remembered
 from carillon.processes.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
@@ -31,6 +31,9 @@ from sound.rendering.solid import SoundingSolid
 VOXEL, FINITE_CELL = "voxel", "finite-cell"
 DISCRETISATIONS = (AUTO, FINITE_CELL, VOXEL)
 """Methods of discretisation; `auto` takes finite cells, or voxels if these refuse a surface."""
+
+FEWEST = RIGID_MODES + 1
+"""Fewest modes that the solver is asked for."""
 
 Made = Callable[[HexMesh | FiniteCells], Solid]
 """Solid of voxels or of finite cells, with its material and what holds it."""
@@ -159,15 +162,17 @@ def with_modes(
 
     model = solid.model
     with one_thread():
-        result = solve(model, modes=model.rigid_modes + how.count)
+        count = model.rigid_modes + how.count
+        result = solve(model, modes=max(count, FEWEST))
         assert result.modes is not None
+        values, modes = result.eigenvalues[:count], result.modes[:, :count]
         accuracy = {**solid.accuracy}
         try:
-            errors = _expected(surface, name, how, made, model, result.eigenvalues, result.modes)
+            errors = _expected(surface, name, how, made, model, values, modes)
             accuracy |= errors.attributes(FROM_SOLID)
         except Exception as error:  # the modes are right without it
             say(f"how far the frequencies of {name!r} are from the solid's cannot be told: {error}")
-    return SolvedSolid(model, result.eigenvalues, result.modes, accuracy)
+    return SolvedSolid(model, values, modes, accuracy)
 
 
 def _expected(
@@ -188,7 +193,7 @@ def _expected(
     cells = made(covering_on(surface, lattice, "largest", name).cells)
     assert isinstance(cells, FiniteCellModel)
     reference = Reference(cells)
-    result = solve(cells, modes=min(cells.rigid_modes + how.count, LAST))
+    result = solve(cells, modes=max(min(cells.rigid_modes + how.count, LAST), FEWEST))
     assert result.modes is not None
     return reference.errors(values, result.eigenvalues, result.modes)
 
