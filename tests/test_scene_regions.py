@@ -265,10 +265,18 @@ def test_objects_that_describe_no_solid(bar, given, said):
         body(bar, **{"count": 0, **given})
 
 
-def test_what_is_found_is_kept(bar, monkeypatch):
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"regions": HALVES},
+        {"material": "brass", "fixed": True, "supports": [{"where": "x < -0.09"}]},
+    ],
+    ids=["regions", "held"],
+)
+def test_what_is_found_is_kept(bar, monkeypatch, given):
     import solver.analysis.library as library
 
-    given = {"regions": HALVES, "count": 3, "resolution": 11}
+    given = {**given, "count": 3, "resolution": 11}
     first = body(bar, **given)
     monkeypatch.setattr(library, "solve", None)
     again = body(bar, **given, position=[0, 0, 1])
@@ -355,3 +363,24 @@ def test_a_held_object_rings_when_it_is_struck(bar):
     hertz = np.fft.rfftfreq(len(heard), 1.0 / 8000)
     near = np.abs(hertz - frequencies[0]) < 10.0
     assert spectrum[near].max() > 10.0 * np.median(spectrum)
+
+
+def test_a_picture_has_the_colours_of_the_regions(bar):
+    from sound.export.scene_gltf import scene_document
+    from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture
+
+    found = body(bar, regions=HALVES, count=0)
+    shape, colours = found.shape, [each.colour for each in found.materials]
+    seen = Appearance.of_regions("bar", shape.vertices, shape.faces, colours, found.which)
+    middles = found.in_solid(shape.vertices[shape.faces].mean(axis=1))[:, 0]
+    iron, beech = (named_material(name).colour for name in ("iron", "beech"))
+    assert seen.colour == iron and seen.colours == (iron, beech)
+    # Triangles at the border are small.
+    wrong = (seen.painted == 1) != (middles > 0.05)
+    assert np.abs(middles[wrong] - 0.05).max(initial=0.0) < 0.01 * SIDES[0]
+    motion = Motion(np.zeros(1), np.zeros((1, 1, 3)), np.array([[[1.0, 0.0, 0.0, 0.0]]]))
+    picture = Picture([seen], motion, None, Camera((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    played = Performance("it", picture, np.zeros((8, 2)), 8000, [], [None])
+    document, _ = scene_document(played)
+    assert [len(mesh["primitives"]) for mesh in document["meshes"]] == [2]
+    assert len(document["materials"]) == 2

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -78,9 +79,10 @@ class ComposedObject:
         key = hashlib.sha256(repr((__version__, _VERSION, how)).encode())
         for part in _content(solid.model):
             key.update(np.ascontiguousarray(part).tobytes())
-        return kept(
+        found = kept(
             key.hexdigest(), lambda: with_modes(self._surface, name, how, self._made, solid)
         )
+        return replace(found, model=solid.model)  # files do not name the region if there is one
 
     def _made(self, mesh: HexMesh | FiniteCells) -> Solid:
         model: Solid
