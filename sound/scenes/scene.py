@@ -86,7 +86,7 @@ class ObjectEntry:
     )
     mesh: File | None = option(
         None,
-        "either builtin:NAME or a mesh file, relative to the scene, of one material; the y of glTF "
+        "either builtin:NAME or a mesh file, relative to the scene; the y of glTF "
         "points up and becomes z, of all other files z points up",
     )
     radius: Annotated[float, between(1e-4, 100.0)] | None = option(
