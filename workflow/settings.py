@@ -8,8 +8,17 @@ from typing import Any, cast
 
 from snakemake.utils import update_config
 
+from carillon.arrays import Surface
 from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
+from carillon.composition.entries import (
+    CompositionEntry,
+    SupportEntry,
+    describes_regions,
+    joined_surface,
+    read_composition,
+)
 from carillon.errors import UserError
+from carillon.fem.geometry import load_surface
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.yaml_input import nearest, read_marked, read_yaml
 from carillon.parameters.sentences import ParameterError, Place, alike
@@ -106,6 +115,8 @@ def check_files(
     with _mistakes_in_lines(files, given):
         for name in config["models"]:
             _check_files_of(config, name)
+        for name in config["times"]["models"]:
+            _check_plain(config, name)
         forests = forests_file(config)
         if forests is not None and not Path(forests).is_file():
             raise ParameterError(
@@ -124,13 +135,32 @@ def _check_files_of(config: Mapping[str, Any], name: str) -> None:
     for key, path in _files_by_key(config, name).items():
         if Path(path).is_file():
             continue
-        meant = alike(model[key], known[key])
+        meant = alike(model[key], known.get(key, {}))
         hint = f" (did you mean {known[key][meant]}?)" if meant else ""
-        others = {"mesh": "a file or builtin:NAME", "material": f"a file or {', '.join(MATERIALS)}"}
+        others = {
+            "mesh": "a file or builtin:NAME",
+            "material": f"a file or {', '.join(MATERIALS)}",
+            "regions": "a file",
+        }
         raise ParameterError(
             ("models", name, key),
             f"found {model[key]!r}, expected {others[key]}{hint}; there is no file {path}; put it "
             "there, or set mesh_folder to the folder that holds it",
+        )
+    for path in _files_of_regions(config, name):
+        if not Path(path).is_file():
+            raise ParameterError(
+                ("models", name, "regions"), f"a region is from {path}, which is no file"
+            )
+
+
+def _check_plain(config: Mapping[str, Any], name: str) -> None:
+    entry = composition_of(config, name)
+    if entry.regions or entry.supports:
+        raise ParameterError(
+            ("times", "models"),
+            f"{name} is of several regions, or held; methods are timed on free solids of one "
+            "Poisson's ratio, so leave it out",
         )
 
 
@@ -151,13 +181,55 @@ def material_of(config: Mapping[str, Any], model: str) -> str:
 
 def model_files(config: Mapping[str, Any], model: str) -> list[str]:
     """Files that a model is made from; none for a built-in object with a named material."""
-    return list(_files_by_key(config, model).values())
+    return [*_files_by_key(config, model).values(), *_files_of_regions(config, model)]
+
+
+def regions_of(config: Mapping[str, Any], model: str) -> str | None:
+    """File of a model's regions and of what holds it; None if it is of one material, and free."""
+    named = config["models"][model]["regions"]
+    return None if named is None else _in_mesh_folder(config, named)
+
+
+def composition_of(config: Mapping[str, Any], model: str) -> CompositionEntry:
+    """Regions of a model, and all that holds it.
+
+    Raises UserError if its file is of no use.
+    """
+    mesh, file = mesh_of(config, model), regions_of(config, model)
+    entry = CompositionEntry()
+    if file is not None or describes_regions(mesh):
+        entry = read_composition(mesh if file is None else file)
+    held = (SupportEntry(where=place) for place in config["models"][model]["fix"])
+    return CompositionEntry(regions=entry.regions, supports=(*entry.supports, *held))
+
+
+def surface_of(config: Mapping[str, Any], model: str) -> Surface:
+    """Triangles [m] around a model."""
+    mesh = mesh_of(config, model)
+    if describes_regions(mesh):
+        return joined_surface(read_composition(mesh), mesh)
+    return load_surface(mesh, config["models"][model]["unit"])
+
+
+def _files_of_regions(config: Mapping[str, Any], model: str) -> list[str]:
+    """Files that the file of a model's regions names."""
+    mesh, file = mesh_of(config, model), regions_of(config, model)
+    file = mesh if file is None and describes_regions(mesh) else file
+    if file is None or not Path(file).is_file():
+        return []
+    named = [
+        name for each in read_composition(file).regions for name in (each.mesh, each.labels) if name
+    ]
+    inside = [name for name in named if not name.startswith(BUILTIN_PREFIX)]
+    return list(dict.fromkeys(path_word(Path(file).parent / name) for name in inside))
 
 
 def _files_by_key(config: Mapping[str, Any], model: str) -> dict[str, str]:
     mesh, material = mesh_of(config, model), material_of(config, model)
     files = {} if mesh.startswith(BUILTIN_PREFIX) else {"mesh": mesh}
-    return files if material in MATERIALS else {**files, "material": material}
+    files |= {} if material in MATERIALS else {"material": material}
+    regions = regions_of(config, model)
+    return files if regions is None else {**files, "regions": regions}
 
 
 def forests_file(config: Mapping[str, Any]) -> str | None:
