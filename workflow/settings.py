@@ -8,17 +8,8 @@ from typing import Any, cast
 
 from snakemake.utils import update_config
 
-from carillon.arrays import Surface
 from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
-from carillon.composition.entries import (
-    CompositionEntry,
-    SupportEntry,
-    describes_regions,
-    joined_surface,
-    read_composition,
-)
 from carillon.errors import UserError
-from carillon.fem.geometry import load_surface
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.yaml_input import nearest, read_marked, read_yaml
 from carillon.parameters.sentences import ParameterError, Place, alike
@@ -155,8 +146,7 @@ def _check_files_of(config: Mapping[str, Any], name: str) -> None:
 
 
 def _check_plain(config: Mapping[str, Any], name: str) -> None:
-    entry = composition_of(config, name)
-    if entry.regions or entry.supports:
+    if config["models"][name]["fix"] or described_by(config, name):
         raise ParameterError(
             ("times", "models"),
             f"{name} is of several regions, or held; methods are timed on free solids of one "
@@ -190,38 +180,20 @@ def regions_of(config: Mapping[str, Any], model: str) -> str | None:
     return None if named is None else _in_mesh_folder(config, named)
 
 
-def composition_of(config: Mapping[str, Any], model: str) -> CompositionEntry:
-    """Regions of a model, and all that holds it.
-
-    Raises UserError if its file is of no use.
-    """
-    mesh, file = mesh_of(config, model), regions_of(config, model)
-    entry = CompositionEntry()
-    if file is not None or describes_regions(mesh):
-        entry = read_composition(mesh if file is None else file)
-    held = (SupportEntry(where=place) for place in config["models"][model]["fix"])
-    return CompositionEntry(regions=entry.regions, supports=(*entry.supports, *held))
-
-
-def surface_of(config: Mapping[str, Any], model: str) -> Surface:
-    """Triangles [m] around a model."""
+def described_by(config: Mapping[str, Any], model: str) -> str | None:
+    """File that tells a model's regions: that of the regions, or a mesh that is made of some."""
     mesh = mesh_of(config, model)
-    if describes_regions(mesh):
-        return joined_surface(read_composition(mesh), mesh)
-    return load_surface(mesh, config["models"][model]["unit"])
+    return regions_of(config, model) or (mesh if Path(mesh).suffix in (".yaml", ".yml") else None)
 
 
 def _files_of_regions(config: Mapping[str, Any], model: str) -> list[str]:
     """Files that the file of a model's regions names."""
-    mesh, file = mesh_of(config, model), regions_of(config, model)
-    file = mesh if file is None and describes_regions(mesh) else file
+    file = described_by(config, model)
     if file is None or not Path(file).is_file():
         return []
-    named = [
-        name for each in read_composition(file).regions for name in (each.mesh, each.labels) if name
-    ]
-    inside = [name for name in named if not name.startswith(BUILTIN_PREFIX)]
-    return list(dict.fromkeys(path_word(Path(file).parent / name) for name in inside))
+    from workflow.composition import files_of  # Its import takes long.
+
+    return files_of(file)
 
 
 def _files_by_key(config: Mapping[str, Any], model: str) -> dict[str, str]:

@@ -9,13 +9,13 @@ from studies.base import parts
 from studies.base.page import Section, StudyPage, listed_modes, origins, section
 from studies.base.parts import grid, html, plot, prose, unbroken
 from studies.base.table import Row, Table, read_table
+from workflow.composition import composition_of
 from workflow.report import verdict
 from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.findings import findings, headline
 from workflow.report.results import Run
 from workflow.report.scaling_tables import assumptions
 from workflow.report.verdict import variant_name
-from workflow.settings import composition_of
 from workflow.variants import SHOWN, TRUTH, VARIANTS
 
 Tables = dict[str, Table]

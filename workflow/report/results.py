@@ -12,6 +12,7 @@ from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.skins import skin_of
 from workflow import settings
+from workflow.composition import surface_of
 from workflow.report.study import MEASURES
 from workflow.variants import candidates_of, further_of, shown_of, variants_of
 
@@ -58,7 +59,7 @@ class Run(Results):
         part = self.config["models"][model]
         if part["discretisation"] == "voxel":
             return None
-        return skin_of(solid, settings.surface_of(self.config, model))
+        return skin_of(solid, surface_of(self.config, model))
 
     def modes_path(self, model: str, variant: str) -> Path:
         """Modes file of a model and variant."""

@@ -18,6 +18,7 @@ from studies.base.page import Section, StudyPage, listed_modes, origins, section
 from studies.base.parts import grid, html, plot, prose
 from studies.base.table import Table
 from workflow import settings
+from workflow.composition import surface_of
 from workflow.report.page import material_facts, mode_pictures
 from workflow.report.verdict import variants_key
 from workflow.validation import plots, strike
@@ -173,7 +174,7 @@ def _cells(evidence: Evidence) -> FiniteCells | None:
 def _solid(evidence: Evidence, regions: Table) -> Section:
     mesh_name = settings.mesh_of(evidence.config, evidence.model)
     part = evidence.settings
-    surface = settings.surface_of(evidence.config, evidence.model)
+    surface = surface_of(evidence.config, evidence.model)
     model = evidence.shown[TRUTH].model
     mesh, cells = model.mesh, _cells(evidence)
     young = model.young if cells else model.young[:, 0]

@@ -10,7 +10,7 @@ from studies.base.media import embedded, inlined, wav_uri
 from studies.base.page import Section, section
 from studies.base.parts import grid, html, plot, prose, unbroken
 from studies.base.table import Table
-from workflow import settings
+from workflow.composition import surface_of
 from workflow.report.verdict import variant_name
 from workflow.validation import plots
 from workflow.validation.evidence import COARSENED, Evidence
@@ -86,7 +86,7 @@ def sound(evidence: Evidence) -> Section:
     """Sound and spectrogram of every method; a sentence if no mode of the truth is heard."""
     response = evidence.response
     if not response.responses[TRUTH].sound.any():
-        surface = settings.surface_of(evidence.config, evidence.model)
+        surface = surface_of(evidence.config, evidence.model)
         sides = lengths(np.ptp(np.asarray(surface.bounds), axis=0))
         silent = f"""Nothing is to be heard: no elastic mode lies between 20 Hz and 20 kHz. Check
             the unit of the mesh; the solid measures {sides} m."""

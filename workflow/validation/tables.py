@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from studies.base.table import Column, Row, each, hidden, table
-from workflow.settings import composition_of
+from workflow.composition import composition_of
 from workflow.validation.criteria import judge
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import Evidence
