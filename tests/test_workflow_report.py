@@ -63,6 +63,7 @@ def modes_file(frequencies, modes, nodes):
         frequencies=np.asarray(frequencies, dtype=float),
         modes=modes,
         mesh=SimpleNamespace(nodes=nodes),
+        model=SimpleNamespace(rigid_modes=6),
     )
 
 
