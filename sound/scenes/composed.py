@@ -95,6 +95,7 @@ class ComposedObject:
             young = _moduli(placed, mesh)
             model = fine_model(mesh, young, placed.region, regions=placed.regions)
         supports = placed_supports(self._supports, model, self._surface, self._entry.name)
+        model = losing(model, self._coefficients)
         return model if supports is None else model.with_supports(supports)
 
     def parts_of(self, vertices: Array, faces: Index) -> Index:
@@ -110,7 +111,7 @@ class ComposedObject:
     def damping(self, solid: SolvedSolid) -> ModalDamping:
         """Damping of its elastic modes."""
         assert solid.eigenvalues is not None and solid.modes is not None
-        return modal_damping(solid.model, solid.eigenvalues, solid.modes, self._coefficients)
+        return modal_damping(solid.model, solid.eigenvalues, solid.modes)
 
 
 def _names() -> Sequence[str]:
@@ -121,12 +122,17 @@ def _coefficients(material: NamedMaterial) -> Coefficients:
     return material.alpha, material.beta
 
 
-def modal_damping(
-    model: Solid, eigenvalues: Array, modes: Array, by_name: Mapping[str, Coefficients]
-) -> ModalDamping:
-    """Damping of elastic modes, of all modes (k,), (n_dofs, k), by that of the regions by name."""
+def losing(model: Solid, by_name: Mapping[str, Coefficients]) -> Solid:
+    """A solid whose regions have these dampings, by name."""
+    regions = model.regions
+    damping = tuple(by_name[name] for name in regions.names)
+    return model.with_regions(replace(regions, damping=damping))
+
+
+def modal_damping(model: Solid, eigenvalues: Array, modes: Array) -> ModalDamping:
+    """Damping of the elastic modes of all (k,), (n_dofs, k) by that of each of the regions."""
     rigid = model.rigid_modes
-    coefficients = [by_name[name] for name in model.regions.names]
+    coefficients = [damping for damping in model.regions.damping if damping is not None]
     elastic = np.ascontiguousarray(modes[:, rigid:])
     return damping_of_regions(model, eigenvalues[rigid:], elastic, coefficients)
 

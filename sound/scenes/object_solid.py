@@ -20,7 +20,7 @@ from solver.response.response import Damping
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
-from sound.scenes.composed import ComposedObject, modal_damping
+from sound.scenes.composed import ComposedObject, losing, modal_damping
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.solved import Discretised
 from sound.scenes.touched import touched_in_file, young_near
@@ -145,7 +145,7 @@ def _damping_of(entry: ObjectEntry, file: ModesFile) -> Damping | ModalDamping:
         name: damping or (own.alpha, own.beta)
         for name, damping in zip(regions.names, regions.damping)
     }
-    return modal_damping(file.model, file.eigenvalues, file.modes, by_name)
+    return modal_damping(losing(file.model, by_name), file.eigenvalues, file.modes)
 
 
 def _volume(model: Solid) -> float | None:
