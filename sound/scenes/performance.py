@@ -171,7 +171,7 @@ class Performance:
     """dict [s]: wall time of each step of the work."""
     accuracies: list[dict[str, Any] | None] = field(default_factory=list)
     """B dicts: expected errors of each object's frequencies, see
-    `sound.scenes.uniform.UniformSolid`; None for a silent object, or if they are unknown."""
+    `sound.scenes.solved.SolvedSolid`; None for a silent object, or if they are unknown."""
     moved: dict[str, list[float]] = field(default_factory=dict)
     """dict: displacements (3,) [m] of overlapping objects that were separated at the start, by
     name."""
