@@ -11,14 +11,25 @@ suppose `import carillon as ca` and `import numpy as np`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Index, Surface
+from carillon.composition.composition import PlacedRegions
+from carillon.composition.domains import Chosen, Domain
+from carillon.composition.entries import (
+    CompositionEntry,
+    Placed,
+    RegionEntry,
+    SolidFrame,
+    SupportEntry,
+    compose,
+)
+from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
@@ -85,6 +96,10 @@ class Mesh:
     """Its triangles, turned alike."""
     name: str = "mesh"
     """For messages and files."""
+    path: str = ""
+    """File that it was read from, or `builtin:NAME`; empty if there is none."""
+    unit: float = 1.0
+    """Metres per unit of that file."""
 
     @classmethod
     def of_triangles(cls, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Self:
@@ -133,7 +148,7 @@ def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     if not isinstance(path, str | Path):
         raise UserError(f"found {path!r:.80}, expected the path of a mesh file, or builtin:NAME")
     metres = checked("unit", unit, MetresPerUnit)
-    return Mesh(load_surface(str(path), metres), surface_name(str(path)))
+    return Mesh(load_surface(str(path), metres), surface_name(str(path)), str(path), metres)
 
 
 def _young(young: Young) -> Young:
@@ -142,9 +157,69 @@ def _young(young: Young) -> Young:
     return young
 
 
+Where = str | Callable[[Array], ArrayLike]
+
+
+def _where(where: Where | None) -> Where | None:
+    if where is not None and not isinstance(where, str) and not callable(where):
+        raise ValueError(f"found {where!r:.80}, expected comparisons of x, y and z or a function")
+    return where
+
+
+@parameters
+class Region(RegionEntry):
+    """A region of a solid: what it is made of, and where it is; everywhere without a place.
+
+    It has a `material` by name, and `young` [Pa], `poisson`, `density` [kg/m^3] and `loss_factor`
+    in place of the material's. `grain` and `radial` (3,), or `pith` (3,) [m], say how wood lies;
+    `grain_young` [Pa], `grain_shear` [Pa] and `grain_poisson` (3,) are those along and across it.
+    Besides `where` its place may be a `box` of two corners [m], a `mesh` file, a `part` of the
+    solid's own, or a `label` of the file `labels`. Raises UserError for two places at once, and for
+    what belongs together and is not.
+
+    Examples
+    --------
+    >>> ca.Region("handle", material="beech", grain=(1, 0, 0), where="x > 0.1").name
+    'handle'
+    """
+
+    where: Annotated[Where | None, Check(_where, alone=True)] = None  # type: ignore[assignment]
+    """Comparisons of x, y and z [m] that hold in it, such as `z < 0.01`; or a function of points
+    (p, 3) [m] that returns which of them (p,) are in it."""
+
+    def domain(self, solid: SolidFrame) -> Domain:
+        """See `RegionEntry.domain`."""
+        return Chosen(self.where) if callable(self.where) else super().domain(solid)
+
+
+@parameters
+class Support(SupportEntry):
+    """What holds a solid somewhere, lets it rest on a pad or on springs, or is fixed to it.
+
+    It is `where` comparisons of x, y and z [m] hold, or region:NAME, or `at` a point (3,) [m], or
+    within a `radius` [m] about that. It acts `along` some axes, and holds what is there, unless it
+    has a `spring` [N/m], by area [N/m^3], or a `pad` of a named material and a `thickness` [m], or
+    is a `mass` [kg].
+
+    Examples
+    --------
+    >>> ca.Support(where="z < 0.01", along="xy").along
+    'xy'
+    """
+
+
+def _several_regions(regions: Any) -> tuple[RegionEntry, ...]:
+    given = tuple(regions) if isinstance(regions, list | tuple) else (regions,)
+    for each in given:
+        if not isinstance(each, RegionEntry):
+            raise ValueError(f"found {each!r:.80}, expected regions")
+    CompositionEntry(given)  # which refuses two of one name
+    return given
+
+
 @parameters
 class Material:
-    """Material of a solid: its moduli, Poisson's ratio, density and damping.
+    """Material of a solid: its moduli, Poisson's ratio, density and damping; or its regions.
 
     Raises UserError for a constant that no material has.
 
@@ -153,6 +228,12 @@ class Material:
     >>> stiffer_above = ca.Material(lambda centres: 1e9 * (1.0 + centres[:, 2]))
     >>> ca.Material.named("steel").density
     7850.0
+    >>> pan = ca.Material(
+    ...     regions=[
+    ...         ca.Region("body", material="iron"),
+    ...         ca.Region("handle", material="beech", grain=(1, 0, 0), where="x > 0.1"),
+    ...     ]
+    ... )
     """
 
     young: Annotated[Young, Check(_young, alone=True)] = 1e9
@@ -167,6 +248,27 @@ class Material:
     """Rayleigh's coefficients of mass [1/s] and of stiffness [s], taken by `render`."""
     seed: Seed = 0
     """Seed of the fields that are drawn."""
+    regions: Annotated[tuple[RegionEntry, ...], Check(_several_regions, alone=True)] = ()
+    """Regions in place of modulus, Poisson's ratio and density; of several in one place the last
+    one counts. Those whose damping is not known have that of the material."""
+    factor: Annotated[Young, Check(_young, alone=True)] = 1.0
+    """Factor on the moduli of the regions: one, one for each voxel (m,), or a function of the
+    voxels' centres (m, 3) [m] that returns (m,)."""
+
+    def __post_init__(self) -> None:
+        is_one = isinstance(self.factor, int | float) and self.factor == 1.0
+        if not self.regions:
+            if not is_one:
+                raise ValueError("factor goes with regions; give young")
+            return
+        for name, default in (
+            ("young", 1e9),
+            ("poisson", DEFAULT_POISSON),
+            ("density", DEFAULT_DENSITY),
+        ):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and value == default):
+                raise ValueError(f"found {name} beside regions, which tell it; leave one out")
 
     # Arrays of moduli have no truth value.
     __eq__ = object.__eq__
@@ -183,10 +285,15 @@ class Material:
         row = named_material(name)
         return cls(row.young, row.poisson, row.density, (row.alpha, row.beta))
 
-    def regions(self) -> Regions:
+    def _table(self) -> Regions:
         """The material as the only one of a solid."""
         young = self.young if isinstance(self.young, int | float) else 1e9
         return Regions.one(self.poisson, self.density, float(young), self.damping)
+
+    def _damped(self, placed: PlacedRegions) -> PlacedRegions:
+        """Regions all of whose damping is known."""
+        own = tuple(self.damping if each is None else each for each in placed.regions.damping)
+        return replace(placed, regions=replace(placed.regions, damping=own))
 
     def moduli(self, mesh: HexMesh) -> Array:
         """Young's modulus (m,), or (m, 8) if given so, of the voxels of a mesh [Pa].
@@ -194,6 +301,10 @@ class Material:
         Raises UserError if a name or a file is unknown, or for an array of another shape or of
         values that no material has.
         """
+        if self.regions:
+            composed = _composed(self, mesh, (), ())
+            assert composed.composition is not None
+            return self._of_regions(composed.composition.of_voxels(mesh), mesh)
         if isinstance(self.young, str):
             _require_no_material(self.young)
             return materials.young_modulus(self.young, mesh, self.seed)
@@ -202,6 +313,20 @@ class Material:
         else:
             young = np.full(mesh.n_cells, self.young) if np.ndim(self.young) == 0 else self.young
         return require_moduli(young, mesh.n_cells, "young")
+
+    def _of_regions(self, placed: PlacedRegions, mesh: HexMesh) -> Array:
+        """Young's modulus (m,) [Pa] of the voxels of regions."""
+        if isinstance(self.factor, str):
+            raise UserError(f"factor: found {self.factor!r:.80}, expected a number, or an array")
+        factor: Any = self.factor
+        if callable(factor):
+            factor = factor(mesh.origin + mesh.edge * (mesh.grid + 0.5))
+        if np.shape(factor) not in ((), (mesh.n_cells,)):
+            raise UserError(
+                f"factor: an array of shape {np.shape(factor)}, expected ({mesh.n_cells},)"
+            )
+        young = placed.regions.moduli(placed.region, factor)
+        return require_moduli(np.broadcast_to(young, mesh.n_cells), mesh.n_cells, "factor")
 
 
 def _require_no_material(young: str) -> None:
@@ -226,7 +351,7 @@ class Solution:
     """Modes of a solid."""
 
     eigenvalues: Array
-    """(k,) [rad^2/s^2], ascending; the first six are those of rigid motions."""
+    """(k,) [rad^2/s^2], ascending; those of rigid motions come first, six of a free solid."""
     frequencies: Array
     """(k,) [Hz], likewise."""
     residuals: Array
@@ -308,6 +433,8 @@ def solve(
     discretisation: str = "voxel",
     initial: Solution | None = None,
     comm: MPI.Comm | None = None,
+    fix: str | Sequence[str] = (),
+    supports: Sequence[SupportEntry] = (),
     **options: Any,
 ) -> Solution:
     """Lowest modes of a solid; collective.
@@ -325,7 +452,7 @@ def solve(
     resolution
         Voxels along the longest side, of a surface.
     modes
-        Number of modes, the six rigid ones included.
+        Number of modes, rigid ones included, of which a free solid has six.
     method
         `auto`, `lanczos`, `lobpcg` or `hcms`; ground truth by `slepc` or `arpack`.
     discretisation
@@ -334,6 +461,11 @@ def solve(
         Modes of a similar material on the same mesh, which are corrected.
     comm
         Ranks that share the work; all that were started unless given.
+    fix
+        Where the solid is held: comparisons of x, y and z [m] such as `z < 0.01`, or `region:NAME`;
+        one text or several.
+    supports
+        What else holds it, see `Support`.
     options
         `tolerance`, `linear_solver` and the other options of `carillon modes`, with underscores.
 
@@ -345,6 +477,9 @@ def solve(
     >>> softer = ca.solve(solution.solid, 0.9 * solution.solid.young, modes=10, initial=solution)
     >>> bool(abs(softer.frequencies[9] / solution.frequencies[9] - 0.9**0.5) < 1e-6)
     True
+    >>> held = ca.solve("builtin:bar", resolution=12, modes=8, fix="x < -0.11")
+    >>> bool(held.frequencies[0] > 10.0)
+    True
     """
     from mpi4py import MPI
 
@@ -352,7 +487,8 @@ def solve(
     from solver.distribution.collective import compute_on_root
 
     ranks = MPI.COMM_WORLD if comm is None else comm
-    solid = compute_on_root(ranks, lambda: _solid(body, material, resolution, discretisation))
+    how = (resolution, discretisation, fix, supports)
+    solid = compute_on_root(ranks, lambda: _solid(body, material, *how))
     start = compute_on_root(ranks, lambda: None if initial is None else _start(initial, solid))
     result = library.solve(
         solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
@@ -368,6 +504,8 @@ def coarsen(
     resolution: int = 32,
     method: str = "ddfem",
     forests: Forests | str | Path | None = None,
+    fix: str | Sequence[str] = (),
+    supports: Sequence[SupportEntry] = (),
 ) -> Solid:
     """A solid of up to eight times fewer elements, one for each 2x2x2 block of voxels.
 
@@ -375,7 +513,7 @@ def coarsen(
 
     Parameters
     ----------
-    body, material, resolution
+    body, material, resolution, fix, supports
         See `solve`; a solid with material must be one of voxels.
     method
         `ddfem`, by regression forests; `average` or `galerkin`; `fit`, what the forests learned.
@@ -394,7 +532,7 @@ def coarsen(
     from solver.coarsening.choice import make_coarsening
     from solver.coarsening.model import build_model
 
-    fine = _solid(body, material, resolution, "voxel")
+    fine = _solid(body, material, resolution, "voxel", fix, supports)
     file = forests.path if isinstance(forests, Forests) else forests
     coarsening = make_coarsening(method, fine.regions.ratios, file)
     young = fine.young[:, 0] if fine.young.ndim > 1 else fine.young
@@ -404,13 +542,18 @@ def coarsen(
 
 
 def matrices(
-    body: Body, material: Given = None, resolution: int = 32, discretisation: str = "voxel"
+    body: Body,
+    material: Given = None,
+    resolution: int = 32,
+    discretisation: str = "voxel",
+    fix: str | Sequence[str] = (),
+    supports: Sequence[SupportEntry] = (),
 ) -> tuple[csr_matrix, csr_matrix]:
     """Stiffness [N/m] and mass [kg] of a solid, (3 n, 3 n), for solvers of your own.
 
     Row 3 i + a is the displacement of node i of the solid's `mesh.nodes` along axis a, so that an
-    eigenvector reshaped to (n, 3) is a shape. The six least eigenvalues [rad^2/s^2] are zero.
-    Raises UserError for anything wrong with the solid. Parameters: see `solve`.
+    eigenvector reshaped to (n, 3) is a shape. Of a free solid the six least eigenvalues [rad^2/s^2]
+    are zero. Raises UserError for anything wrong with the solid. Parameters: see `solve`.
 
     Examples
     --------
@@ -422,7 +565,7 @@ def matrices(
     """
     from solver.exchange.matrices import matrices as assembled
 
-    return assembled(_solid(body, material, resolution, discretisation))
+    return assembled(_solid(body, material, resolution, discretisation, fix, supports))
 
 
 def read(path: str | Path) -> Solution | Design:
@@ -673,7 +816,8 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
         Design of the same mesh to go on from.
     keys
         Keys of a project: `mesh`, `resolution`, `targets`, `optimiser` and so on, sections as
-        dictionaries; paths are from the folder of the project, or the present one.
+        dictionaries, `regions` and `supports` as such or as `Region` and `Support`; paths are from
+        the folder of the project, or the present one.
 
     Notes
     -----
@@ -697,7 +841,7 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
         own = described.get(key)
         if isinstance(own, Mapping) and isinstance(value, Mapping):
             value = {**own, **value}
-        described[key] = value
+        described[key] = _plain_entries(value)
     folder = Path() if project is None else Path(project).parent
     problem = prepare(project_of(described, folder))
     return Design(optimise(problem, None if initial is None else initial.found))
@@ -812,30 +956,104 @@ def _shapes(modes: Array | None) -> Array | None:
     return None if modes is None else modes.reshape(-1, 3, modes.shape[1]).transpose(2, 0, 1)
 
 
-def _solid(body: Body, given: Given, resolution: int, discretisation: str) -> Solid:
+def _solid(
+    body: Body,
+    given: Given,
+    resolution: int,
+    discretisation: str,
+    fix: str | Sequence[str] = (),
+    supports: Sequence[SupportEntry] = (),
+) -> Solid:
     made = given if isinstance(given, Material) else Material(1e9 if given is None else given)
     if isinstance(body, Solid):
+        if made.regions or fix or supports:
+            raise UserError(
+                "regions, fix and supports go with a surface or with hexahedra; a solid keeps what "
+                "it has"
+            )
         solid = body if given is None else body.with_young(made.moduli(body.mesh))
-        if not isinstance(given, Material):
-            return solid
-    elif isinstance(body, HexMesh):
-        solid = fine_model(body, made.moduli(body))
-    else:
-        mesh = body if isinstance(body, Mesh) else load_mesh(body)
-        solid = _meshed(mesh, made, resolution, discretisation)
-    return solid.with_regions(made.regions())
+        return solid.with_regions(made._table()) if isinstance(given, Material) else solid
+    described = body if isinstance(body, Mesh | HexMesh) else load_mesh(body)
+    composed = _composed(made, described, fix, supports)
+    solid = _meshed(described, made, resolution, discretisation, composed)
+    name = described.name if isinstance(described, Mesh) else "mesh"
+    held = placed_supports(composed.supports, solid, _surface(described), name)
+    return solid if held is None else solid.with_supports(held)
 
 
-def _meshed(mesh: Mesh, material: Material, resolution: int, discretisation: str) -> Solid:
+def _composed(
+    material: Material,
+    body: Mesh | HexMesh,
+    fix: str | Sequence[str],
+    supports: Sequence[SupportEntry],
+) -> Placed:
+    """Regions and supports with their places."""
+    fixed = tuple(fix) if isinstance(fix, list | tuple) else (fix,)
+    for each in fixed:
+        if not isinstance(each, str):
+            raise UserError(f"fix: found {each!r:.80}, expected comparisons of x, y and z")
+    held = tuple(supports) if isinstance(supports, list | tuple) else (supports,)
+    for one in held:
+        if not isinstance(one, SupportEntry):
+            raise UserError(f"supports: found {one!r:.80}, expected supports")
+    if not (material.regions or fixed or held):
+        return Placed(None, ())
+    frame = SolidFrame("", _surface(body), "mesh")
+    if isinstance(body, Mesh):
+        frame = SolidFrame(body.path, body.surface, body.name, body.unit)
+    return compose(CompositionEntry(material.regions, held), frame, fixed)
+
+
+def _surface(body: Mesh | HexMesh) -> Surface:
+    """Triangles around a solid [m]."""
+    if isinstance(body, Mesh):
+        return body.surface
+    from trimesh import Trimesh  # Its import takes long.
+
+    from carillon.fem.geometry.faces import surface_quads
+
+    quads = surface_quads(body)
+    return Trimesh(body.nodes, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
+
+
+def _meshed(
+    body: Mesh | HexMesh, material: Material, resolution: int, discretisation: str, composed: Placed
+) -> Solid:
+    if isinstance(body, HexMesh):
+        return _of_voxels(body, material, composed)
     count = checked("resolution", resolution, Resolution)
     if checked("discretisation", discretisation, Discretisation) == "voxel":
-        hexahedra = mesh.hexahedra(count)
-        return fine_model(hexahedra, material.moduli(hexahedra))
+        return _of_voxels(body.hexahedra(count), material, composed)
     from carillon.fem.finite_cells.build import finite_cells
     from carillon.fem.finite_cells.model import finite_cell_model
 
-    cells = finite_cells(mesh.surface, count, name=mesh.name)
-    return finite_cell_model(cells, material.moduli(cells.mesh))
+    cells = finite_cells(body.surface, count, name=body.name)
+    if composed.composition is None:
+        return finite_cell_model(cells, material.moduli(cells.mesh), material._table())
+    placed = material._damped(composed.composition.of_cells(cells))
+    young = material._of_regions(placed, cells.mesh)
+    return finite_cell_model(cells, young, placed.regions, placed.region, placed.shared)
+
+
+def _of_voxels(mesh: HexMesh, material: Material, composed: Placed) -> Solid:
+    if composed.composition is None:
+        return fine_model(mesh, material.moduli(mesh), regions=material._table())
+    placed = material._damped(composed.composition.of_voxels(mesh))
+    young = material._of_regions(placed, mesh)
+    return fine_model(mesh, young, placed.region, regions=placed.regions)
+
+
+def _plain_entries(value: Any) -> Any:
+    """A value of a project; regions and supports as documents have them."""
+    from carillon.parameters.documents import document_of
+
+    if not isinstance(value, list | tuple):
+        return value
+    entries = (RegionEntry, SupportEntry)
+    for each in value:
+        if isinstance(each, Region) and callable(each.where):
+            raise UserError(f"region {each.name!r}: where is a function; projects keep texts")
+    return [document_of(each) if isinstance(each, entries) else each for each in value]
 
 
 def _modes_of(solution: Solution | str | Path) -> ModesFile:

@@ -443,9 +443,10 @@ def painted_parts_give_the_bits_of_a_whole_synthesis() -> None:
         (painted, 0.2),
         (before, 0.2),
     ):
-        modes = following.solve(young if COMM.rank == 0 else None, poisson=poisson)
+        regions = None if poisson is None else Regions.one(poisson)
+        modes = following.solve(young if COMM.rank == 0 else None, regions=regions)
         alone = ModalSolver(model, options, COMM)
-        cold = alone.solve(young if COMM.rank == 0 else None, poisson=poisson)
+        cold = alone.solve(young if COMM.rank == 0 else None, regions=regions)
         assert (modes.values == cold.values).all()
         assert (modes.vectors == cold.vectors).all()
 
@@ -484,8 +485,9 @@ def a_synthesis_follows_materials_that_are_corrected_by_planes() -> None:
         young = model.young.copy()
         young[:20] *= factor
         mine = young if COMM.rank == 0 else None
-        modes = following.solve(mine, modes if warm else None, poisson=poisson)
-        other = model.with_regions(Regions.one(poisson or model.poisson))
+        regions = Regions.one(poisson or model.poisson)
+        modes = following.solve(mine, modes if warm else None, regions=regions)
+        other = model.with_regions(regions)
         exact = solids.dense_eigenvalues(other.with_young(young))[6:16]
         assert np.abs(modes.values[6:] / exact - 1.0).max() < 1e-8
         assert ("hcms" in modes.evidence) == (not warm)

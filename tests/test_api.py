@@ -134,13 +134,84 @@ def test_a_solid_sounds_by_the_damping_of_its_material(tmp_path):
     solution.save(tmp_path / "bell.h5")
     assert np.array_equal(ca.render(tmp_path / "bell.h5", at), samples)
     assert ca.compare(tmp_path / "bell.h5", solution).frequency_rms_relative_error == 0.0
-    undamped = replace(solution.solid.regions, damping=(None,))
-    replace(solution, solid=solution.solid.with_regions(undamped)).save(tmp_path / "old.h5")
+    table = solution.solid.regions
+    undamped = solution.solid.with_regions(replace(table, damping=(None,)))
+    replace(solution, solid=undamped).save(tmp_path / "old.h5")
     default = ca.render(solution, at, damping=api.DAMPING)
     assert np.array_equal(ca.render(tmp_path / "old.h5", at), default)
 
 
+PAN = [
+    ca.Region("body", material="iron"),
+    ca.Region("handle", material="beech", grain=(1, 0, 0), where="x > 0.02"),
+]
+
+
+def test_regions_by_text_by_function_and_of_a_file_are_the_same_solid(tmp_path):
+    chosen = ca.Region(
+        "handle", material="beech", grain=(1, 0, 0), where=lambda points: points[:, 0] > 0.02
+    )
+    bodies = ("builtin:bar", ca.load_mesh("builtin:bar").hexahedra(12))
+    solutions = [
+        ca.solve(body, ca.Material(regions=regions), resolution=12, modes=9)
+        for body in bodies
+        for regions in (PAN, [PAN[0], chosen])
+    ]
+    for solution in solutions[1:]:
+        np.testing.assert_allclose(solution.frequencies[6:], solutions[0].frequencies[6:])
+    solid = solutions[0].solid
+    assert solid.regions.names == ("body", "handle") and solid.density > 1000.0
+    solutions[0].save(tmp_path / "pan.h5")
+    assert ca.read(tmp_path / "pan.h5").solid.regions.names == ("body", "handle")
+    halved = ca.solve("builtin:bar", ca.Material(regions=PAN, factor=0.25), resolution=12, modes=9)
+    np.testing.assert_allclose(2.0 * halved.frequencies[6:], solutions[0].frequencies[6:])
+    mesh = bodies[1]
+    material = ca.Material(regions=PAN)
+    assert np.array_equal(material.moduli(mesh), solid.young[:, 0])
+
+
+@pytest.mark.parametrize("discretisation", ["voxel", "finite-cell"])
+def test_a_held_solid_has_no_rigid_modes(discretisation):
+    how = {"resolution": 12, "modes": 8, "discretisation": discretisation}
+    material = ca.Material(regions=PAN)
+    held = ca.solve("builtin:bar", material, fix="x < -0.11", **how)
+    same = ca.solve("builtin:bar", material, supports=[ca.Support(where="x < -0.11")], **how)
+    assert held.solid.rigid_modes == 0 and held.frequencies[0] > 10.0
+    np.testing.assert_allclose(held.frequencies, same.frequencies)
+    loaded = ca.Support(at=(0.1, 0.0, 0.03), mass=0.5)
+    heavier = ca.solve("builtin:bar", material, fix="x < -0.11", supports=[loaded], **how)
+    assert (heavier.frequencies < held.frequencies).all()
+
+
+def test_regions_whose_damping_is_not_known_have_that_of_the_material():
+    regions = [ca.Region("a"), ca.Region("b", material="steel", where="x > 0")]
+    solution = ca.solve(
+        "builtin:bar", ca.Material(regions=regions, damping=(3.0, 1e-7)), resolution=8, modes=8
+    )
+    steel = ca.Material.named("steel").damping
+    assert solution.solid.regions.damping == ((3.0, 1e-7), steel)
+    coarse = ca.coarsen("builtin:bar", ca.Material(regions=regions), resolution=8, fix="x < -0.11")
+    assert coarse.rigid_modes == 0 and len(coarse.regions) == 2
+
+
 MISTAKES = [
+    (lambda _: ca.Region("a", where="x < 1", box=((0, 0, 0), (1, 1, 1))), "expected one place"),
+    (lambda _: ca.Region("a", where=5), "where: found 5, expected comparisons"),
+    (lambda _: ca.Support(mass=1.0), "expected where or at"),
+    (lambda _: ca.Material(2e9, regions=PAN), "found young beside regions"),
+    (lambda _: ca.Material(regions=PAN, density=900.0), "found density beside regions"),
+    (lambda _: ca.Material(factor=2.0), "factor goes with regions"),
+    (lambda _: ca.Material(regions=[PAN[0]] * 2), "two regions are called 'body'"),
+    (lambda _: ca.Material(regions=["iron"]), "regions: found 'iron', expected regions"),
+    (lambda bar: ca.solve(bar.solid, ca.Material(regions=PAN)), "a solid keeps what it has"),
+    (lambda bar: ca.solve(bar.solid, fix="x < 0"), "a solid keeps what it has"),
+    (lambda _: ca.solve("builtin:bar", fix=5), "fix: found 5"),
+    (lambda _: ca.solve("builtin:bar", fix="x >", resolution=8), "cannot be read"),
+    (lambda _: ca.solve("builtin:bar", supports=["x"]), "supports: found 'x'"),
+    (
+        lambda _: ca.solve("builtin:bar", ca.Material(regions=PAN, factor=[1.0, 2.0]), 8),
+        r"factor: an array of shape \(2,\)",
+    ),
     (lambda _: ca.load_mesh("builtin:bar", unit="mm"), "unit: found 'mm', expected a number"),
     (lambda _: ca.load_mesh(5), "found 5, expected the path of a mesh file"),
     (lambda _: ca.Mesh.of_triangles("a", "b", "it"), "it: could not convert"),

@@ -9,7 +9,7 @@ from tests.programs import checkout_environment, python
 
 SLOW = set(
     "a_scene a_study coarsening design_from_a_clip export_a_design melody own_objective "
-    "pan_of_two_materials strike_and_hear train_forests".split()
+    "pan_of_iron_and_beech strike_and_hear train_forests".split()
 )
 """Examples that take more than ten seconds, and are run each night."""
 LIGHT = 60_000

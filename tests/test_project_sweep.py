@@ -16,6 +16,8 @@ from sound.project.project import Project, load_project, project_of
 from studio.session import open_studio
 
 LEAST = {"mesh": "builtin:bar", "targets": [{"name": "end", "vertex": 3, "clip": "end.wav"}]}
+ENTRIES = {"regions": [{"name": "body"}], "supports": [{"where": "x < 0"}]}
+"""Entries of the lists that are empty unless given, whose values are put in place."""
 VALUES: tuple[Any, ...] = (
     None,
     True,
@@ -63,7 +65,8 @@ def keys(schema: dict[str, Any], path: Place = ()) -> Iterator[Place]:
 
 def put(described: Any, path: Place, value: Any) -> Any:
     """Keys and values with another one at a place."""
-    result = copy.deepcopy(described)
+    entries = {key: each for key, each in ENTRIES.items() if key == path[0] and len(path) > 2}
+    result = copy.deepcopy({**described, **entries})
     place = result
     for key, following in zip(path, path[1:]):
         if isinstance(key, str):

@@ -125,7 +125,7 @@ def test_poissons_ratio_is_found_and_gone_on_from(tmp_path, discretisation, coar
     narrow = replace(free, material=replace(free.material, poisson_bounds=[0.2, 0.48]))
     other = prepare(narrow, targets)
     z = coordinates_of(other, designed)
-    assert other.setting.material.poisson(z) == pytest.approx(designed.model.poisson)
+    assert other.setting.simulation().regions(z).poisson == pytest.approx(designed.model.poisson)
 
 
 def test_free_ratios_that_forests_are_not_for_are_refused_before_the_search(tmp_path):

@@ -114,6 +114,48 @@ def test_a_project_as_a_dictionary_is_the_same_project_anywhere(folder, tmp_path
     assert load_project(write(other, project.as_dict())) == project
 
 
+REGIONS = [
+    {"name": "body", "material": "iron"},
+    {"name": "lid", "material": "brass", "mesh": "lid.stl"},
+]
+
+
+def test_regions_and_supports_are_read_and_written(folder, tmp_path):
+    project = load(folder, regions=REGIONS, supports=[{"where": "z < 0.01", "along": "xy"}])
+    assert [each.name for each in project.composition.regions] == ["body", "lid"]
+    assert project.regions[1].mesh == str(folder / "lid.stl")
+    assert project.supports[0].along == "xy"
+    assert project.solid == load(folder).solid
+    assert load_project(write(tmp_path, project.as_dict())) == project
+    Draft202012Validator(SCHEMA).validate(project.as_dict())
+
+
+@pytest.mark.parametrize("material", ["iron", "beech"])
+def test_wood_is_simulated_on_all_voxels_where_it_is_left_to_the_program(folder, material):
+    regions = [{"name": "body", "material": material}]
+    expected = "ddfem" if material == "iron" else "none"
+    assert load(folder, regions=regions).coarsen == expected
+    assert load(folder, regions=regions, coarsen="average").coarsen == "average"
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"poisson": 0.3}, "poisson: found 0.3 beside regions"),
+        ({"density": 900.0}, "density: found 900 beside regions"),
+        ({"material": {"young": 2e9}}, "material.young: found 2e.09 beside regions"),
+        ({"regions": [{"name": "a", "material": "irn"}]}, "no material 'irn'.* mean iron"),
+        ({"regions": [{"name": "a"}, {"name": "a"}]}, "two regions are called 'a'"),
+        ({"regions": [{"material": "iron"}]}, r"regions\[0\]: the key name is missing"),
+        ({"supports": [{"mass": 1}]}, r"supports\[0\]: expected where or at"),
+    ],
+)
+def test_regions_that_say_nothing_or_too_much(folder, keys, says):
+    with pytest.raises(UserError, match=says) as caught:
+        load(folder, **{"regions": REGIONS, **keys})
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("number", ["1e9", "1.0e9", "1.0e+9", "1000000000"])
 def test_numbers_may_be_written_as_people_do(folder, number):
     text = yaml.safe_dump(LEAST) + f"material: {{young: {number}}}\nmodes: 12.0\n"

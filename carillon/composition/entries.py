@@ -260,6 +260,14 @@ class CompositionEntry:
             if names.count(name) > 1:
                 raise ValueError(f"two regions are called {name!r}; give each a name of its own")
 
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether no region is of wood, or has axes otherwise.
+
+        Raises UserError as `RegionEntry.row` does.
+        """
+        return all(each.row().is_isotropic for each in self.regions)
+
 
 def _path(file: str, folder: Path) -> str:
     return file if file.startswith("builtin:") else str(folder / file)

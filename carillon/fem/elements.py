@@ -89,6 +89,10 @@ class Elements(ABC):
         return matrices
 
     @abstractmethod
+    def moduli_of(self, chosen: Flags) -> Array:
+        """Moduli like `young` at the points of chosen regions (r,), 0 at others."""
+
+    @abstractmethod
     def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
         """Stiffness (c, 3 k, 3 k) [N/m] without supports."""
 
@@ -104,9 +108,9 @@ class Elements(ABC):
         """The same elements with other moduli."""
         return self.of(young, *self.arrays()[1:])
 
-    def with_poisson(self, poisson: float) -> Self:
-        """The same elements with another Poisson's ratio."""
-        return replace(cast(Any, self), regions=self.regions.with_poisson(poisson))
+    def with_regions(self, regions: Regions) -> Self:
+        """The same elements of other materials."""
+        return replace(cast(Any, self), regions=regions)
 
     def __len__(self) -> int:
         return len(self.young)
@@ -158,6 +162,10 @@ class HexElements(Elements):
         if self.kinds is None:
             return weights
         return np.einsum("pk,pkj->pj", weights, node_weights()[self.kinds[elements]])
+
+    def moduli_of(self, chosen: Flags) -> Array:
+        there = chosen[0] if self.region is None else chosen[self.region]
+        return np.asarray(np.where(there, self.young, 0.0))
 
     def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
         stiffness = self._uniform_edges(chosen)

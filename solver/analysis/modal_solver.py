@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeGuard, cast
 
+import numpy as np
 from mpi4py import MPI
 
 from carillon.arrays import Array
@@ -14,6 +15,7 @@ from carillon.command_line.progress import say
 from carillon.errors import ConvergenceError
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import require_coarse_moduli
+from carillon.fem.regions import Regions
 from carillon.processes.memory import reuse_freed_memory
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
@@ -26,7 +28,7 @@ from solver.analysis.phases import Phases, RankClock
 from solver.analysis.proof import ground_truth, prove
 from solver.assembly.system import Layout, System, assemble
 from solver.distribution.collective import bcast_from_root, compute_on_root, share_cores
-from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_poisson
+from solver.distribution.local_mesh import LocalMesh, distribute, scatter_moduli, with_regions
 from solver.linear import Inverse, LinearSolver
 from solver.subspace.weyl import CountingLaw
 
@@ -129,7 +131,7 @@ class ModalSolver:
         self,
         young: Array | None = None,
         initial_modes: Initial | None = None,
-        poisson: float | None = None,
+        regions: Regions | None = None,
         coarsened: bool = False,
     ) -> Modes:
         """Compute the lowest modes.
@@ -146,8 +148,8 @@ class ModalSolver:
         initial_modes
             Modes of a similar material on the same mesh, or this rank's rows (local, k) of such,
             or those of a coarser mesh, see `solver.analysis.coarse_start`: they are corrected.
-        poisson
-            Poisson's ratio, the same on every rank; that of the model if not given.
+        regions
+            Materials in place of the model's, in their order and the same on every rank.
         coarsened
             Whether `young` (m, 8) is what a coarsening made, which may lie beyond the limits of
             moduli that users give.
@@ -163,7 +165,7 @@ class ModalSolver:
             def of_material(local_mesh: LocalMesh) -> LocalMesh:
                 if changed:
                     local_mesh = scatter_moduli(local_mesh, moduli, self.comm)
-                return local_mesh if poisson is None else with_poisson(local_mesh, poisson)
+                return local_mesh if regions is None else with_regions(local_mesh, regions)
 
             local_mesh = of_material(self.local_mesh)
 
@@ -172,8 +174,10 @@ class ModalSolver:
                 return local_mesh if same else of_material(self._by_parts)
 
             similar = initial_modes if self._is_of_same_mesh(initial_modes) else None
-            like = None if similar is None else similar.system
             elements = local_mesh.cells.elements
+            density = elements.regions.density
+            same_mass = similar is not None and np.array_equal(similar.density, density)
+            like = similar.system if similar is not None and same_mass else None
             system = assemble(local_mesh, self.comm, self._layout, elements, self._threads, like)
         evidence: dict[str, Any] = {
             "method": options.method,
@@ -210,6 +214,7 @@ class ModalSolver:
             phases.seconds,
             pairs.guard,
             pairs.inverse,
+            density,
         )
 
     def _factorise_after(self, error: ConvergenceError) -> None:

@@ -31,6 +31,9 @@ class Modes:
     none."""
     inverse: Lasting | None = None
     """Inverse that a warm start makes use of, if there is one."""
+    density: Array = field(default_factory=lambda: np.empty(0))
+    """(r,) density of each region [kg/m^3], which tells whether a later system has the same
+    mass."""
 
     @property
     def rigid(self) -> int:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Flags, Index
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.model import Solid
+from carillon.fem.regions import Regions
 from solver.distribution.collective import AnyArray, bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.decomposition import Decomposition, decompose, decompose_by_planes
 from solver.distribution.planes import lattice_of
@@ -157,9 +158,9 @@ def scatter_moduli(local_mesh: LocalMesh, young: Array | None, comm: MPI.Comm) -
     return replace(local_mesh, cells=cells)
 
 
-def with_poisson(local_mesh: LocalMesh, poisson: float) -> LocalMesh:
-    """A rank's part of the solid with another Poisson's ratio."""
-    cells = replace(local_mesh.cells, elements=local_mesh.cells.elements.with_poisson(poisson))
+def with_regions(local_mesh: LocalMesh, regions: Regions) -> LocalMesh:
+    """A rank's part of the solid of other materials."""
+    cells = replace(local_mesh.cells, elements=local_mesh.cells.elements.with_regions(regions))
     return replace(local_mesh, cells=cells)
 
 

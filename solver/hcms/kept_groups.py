@@ -31,7 +31,8 @@ class KeptGroups:
     coefficients: dict[int, tuple[Array, Array]] = field(default_factory=dict)
     """Coefficients of each merged group in the modes of its left and of its right child."""
     laws: tuple[Elasticity, ...] = ()
-    """Elasticity of its regions."""
+    density: Array = field(default_factory=lambda: np.empty(0))
+    """Elasticity and density [kg/m^3] of its regions."""
 
     def forget(self) -> None:
         """Keep nothing: a synthesis that failed has made some of its groups."""
@@ -46,16 +47,18 @@ class KeptGroups:
         Collective. `elements` are those that touch each subdomain of this rank; the next call
         compares with them.
         """
-        laws = next(iter(elements.values())).regions.laws if elements else self.laws
+        laws, density = self.laws, self.density
+        if elements:
+            regions = next(iter(elements.values())).regions
+            laws, density = regions.laws, regions.density
+        is_same = laws == self.laws and np.array_equal(density, self.density)
         same = [
             part
             for part, each in elements.items()
-            if laws == self.laws
-            and part in self.young
-            and np.array_equal(each.young, self.young[part])
+            if is_same and part in self.young and np.array_equal(each.young, self.young[part])
         ]
         self.young = {part: each.young for part, each in elements.items()}
-        self.laws = laws
+        self.laws, self.density = laws, density
         result = {part for parts in comm.allgather(same) for part in parts}
         for merge in tree.merges:
             if merge.left in result and merge.right in result:

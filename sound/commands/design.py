@@ -166,6 +166,7 @@ def summarise(design: Design) -> dict[str, Any]:
     off = np.abs(design.frequencies / targets - 1.0)
     assert design.damping is not None
     ratios = design.damping.dampings / design.targets.dampings
+    loss = design.damping.loss_factors
     return {
         **{key: evidence[key] for key in _COSTS},
         "fall": fall(evidence["cost_start"], evidence["cost"]),
@@ -183,10 +184,33 @@ def summarise(design: Design) -> dict[str, Any]:
         "density_kg_per_m3": design.model.density,
         "poisson": design.model.poisson,
         "damping_ratios": ratios.tolist(),
-        "loss_factors": np.unique(design.damping.loss_factors).tolist(),
+        "regions": _regions(design),
+        "loss_factors": [] if loss is None else np.unique(loss).tolist(),
         "mass_damping_per_second": design.damping.mass_per_second,
         "residual_max": evidence["residual_max"],
     }
+
+
+def _regions(design: Design) -> list[dict[str, Any]]:
+    """What the regions of a design have become, in their order."""
+    table = design.model.regions
+    rows = np.zeros(len(design.young), int) if design.fine_region is None else design.fine_region
+    found = []
+    for name in dict.fromkeys(table.names):
+        own = [row for row, each in enumerate(table.names) if each == name]
+        young = design.young[np.isin(rows, own)]
+        if not len(young):  # Cells are of it in parts only.
+            continue
+        found.append(
+            {
+                "name": name,
+                "young_min_pa": float(young.min()),
+                "young_max_pa": float(young.max()),
+                "density_kg_per_m3": float(table.density[own[0]]),
+                "poisson": table.laws[own[0]].poisson,
+            }
+        )
+    return found
 
 
 def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
@@ -199,7 +223,7 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
             _rms_sentence(summary),
-            _material_sentence(design),
+            *_material_sentences(design, summary),
             _damping_sentence(summary),
             f"design: {out}",
         ]
@@ -216,22 +240,35 @@ def _rms_sentence(summary: dict[str, Any]) -> str:
     )
 
 
-def _material_sentence(design: Design) -> str:
+def _material_sentences(design: Design, summary: dict[str, Any]) -> list[str]:
+    regions = summary["regions"]
+    lines = []
+    for each in regions:
+        low, high = (each[f"young_{end}_pa"] / 1e9 for end in ("min", "max"))
+        ratio = "its own elasticity along each axis"
+        if each["poisson"] is not None:
+            ratio = f"Poisson's ratio {each['poisson']:.3g}"
+        name = f"{each['name']}: " if len(regions) > 1 else ""
+        density = each["density_kg_per_m3"]
+        lines.append(
+            f"{name}Young's modulus {low:.3g} to {high:.3g} GPa, density {density:.4g} kg/m^3, "
+            f"{ratio}"
+        )
     low, high = design.young.min(), design.young.max()
-    text = (
-        f"Young's modulus {low / 1e9:.3g} to {high / 1e9:.3g} GPa, density "
-        f"{design.model.density:.4g} kg/m^3, Poisson's ratio {design.model.poisson:.3g}"
-    )
     least, most = design.settings["material"]["young_bounds"] or (low, high)
     beyond = np.mean((design.young < 0.999 * least) | (design.young > 1.001 * most))
-    return f"{text}; {beyond:.1%} of the voxels are beyond young_bounds" if beyond else text
+    if beyond:
+        lines[-1] += f"; {beyond:.1%} of the voxels are beyond young_bounds"
+    return lines
 
 
 def _damping_sentence(summary: dict[str, Any]) -> str:
     low, median, high = np.quantile(summary["damping_ratios"], (0.25, 0.5, 0.75))
-    factors = summary["loss_factors"]
+    factors, by = summary["loss_factors"], "the regions' own damping"
+    if factors:
+        by = f"loss factors of {min(factors):.2g} to {max(factors):.2g}"
     return (
-        f"dampings by loss factors of {min(factors):.2g} to {max(factors):.2g}: {median:.2f} of "
+        f"dampings by {by}: {median:.2f} of "
         f"the clips' (median), half of them {low:.2f} to {high:.2f}"
     )
 

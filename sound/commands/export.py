@@ -58,11 +58,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _content(kind: str, design: Design) -> str:
+    from sound.export.formats import exported_moduli, has_table
+
     if kind == "npy":
-        young, model = design.young, design.model
-        return (
+        young, model = exported_moduli(design), design.model
+        text = (
             f"{len(young):,} moduli, {young.min() / 1e9:.3g} to {young.max() / 1e9:.3g} GPa, for "
-            f"--density {model.density:.6g} --poisson {model.poisson:.6g}"
         )
+        if has_table(design):
+            return f"{text}--regions: factors on those of the regions, times 1 GPa"
+        return f"{text}--density {model.density:.6g} --poisson {model.poisson:.6g}"
     hertz = design.frequencies
     return f"{len(hertz)} modes, {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"

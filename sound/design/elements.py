@@ -1,19 +1,24 @@
 """Elements of the analysed solid, as functions of the moduli of its voxels."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
+from carillon.composition.composition import PlacedRegions
+from carillon.errors import UserError
+from carillon.fem.elasticity import Elasticity
 from carillon.fem.element import quadrature_stiffness
 from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.model import finite_cell_model
-from carillon.fem.finite_cells.shapes import strain_factors
+from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
+from carillon.fem.finite_cells.shapes import POINTS, strain_factors
 from carillon.fem.geometry import HexMesh, blocks_from_mesh
-from carillon.fem.model import Constants, Solid, fine_model
+from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.fem.regions import Regions
+from carillon.fem.supports import Supports
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.problem import ProblemOptions
@@ -22,15 +27,26 @@ from solver.coarsening.model import block_moduli, coarse_model
 
 STRAINS = 6
 """Rank of the stiffness at a quadrature point."""
+Law = float | Elasticity
+"""Poisson's ratio, or another elasticity."""
+
+
+@dataclass(frozen=True)
+class RegionElements:
+    """Elements that hold some of a region: a row of the table, and which elements (r,)."""
+
+    region: int
+    cells: Index | slice
 
 
 class AnalysedElements(ABC):
     """Elements of a solid as functions of the moduli (M,) [Pa] of its voxels.
 
-    `model` is the analysed solid with moduli of 1 Pa.
+    `model` is the analysed solid with moduli of 1 Pa, `parts` are its elements by region.
     """
 
     model: Solid
+    parts: list[RegionElements]
 
     def with_young(self, young: Array) -> Solid:
         """The solid with these moduli."""
@@ -41,60 +57,128 @@ class AnalysedElements(ABC):
         return solver.solve(young, *how)
 
     @abstractmethod
-    def slopes(self, young: Array, directions: Array) -> Array:
-        """Derivatives (p c, m) of the moduli at the p points of c elements.
+    def slopes(self, young: Array, directions: Array) -> list[Array]:
+        """Derivatives (p r, m) of the moduli at the p points of the r elements of each part.
 
         They are directional derivatives along m `directions` (M, m) of the voxels' moduli.  Raises
         UserError if the coarsening has no derivatives.
         """
 
     @abstractmethod
-    def strains(self, poisson: float) -> Array:
+    def strains(self, law: Law) -> Array:
         """Matrices B (p, 6, 3 k); the stiffness of modulus 1 at point p is B_p^T B_p."""
 
 
 def analysed_elements(
-    mesh: HexMesh, options: ProblemOptions, cells: FiniteCells | None = None
+    mesh: HexMesh,
+    options: ProblemOptions,
+    cells: FiniteCells | None = None,
+    placed: PlacedRegions | None = None,
+    supports: Supports | None = None,
 ) -> AnalysedElements:
     """Elements of a solid by its options: finite cells with its voxels, voxels, or blocks of a
     coarsening.
+
+    Its materials are `placed`, by default one by the options.  Raises UserError for what has no
+    derivatives.
     """
-    constants: Constants = {"regions": Regions.one(options.poisson, options.density)}
+    if placed is None:
+        placed = PlacedRegions(Regions.one(options.poisson, options.density))
     if cells is not None:
-        return _CellElements(cells, constants)
-    coarsening = options.coarsening()
+        return _CellElements(cells, placed, supports)
+    coarsening = coarsening_of(options, placed.regions)
     if coarsening is None:
-        return _FineElements(mesh, constants)
-    return _CoarseElements(mesh, coarsening, constants)
+        return _FineElements(mesh, placed, supports)
+    return _CoarseElements(mesh, coarsening, placed, supports)
+
+
+def coarsening_of(options: ProblemOptions, regions: Regions) -> Coarsening | None:
+    """The coarsening of a search; None without.
+
+    Raises UserError if it is not for all Poisson's ratios, or some region is anisotropic.
+    """
+    coarsening = options.coarsening(regions)
+    if coarsening is not None and coarsening.general is not None and not regions.is_isotropic:
+        wood = next(name for name, law in zip(regions.names, regions.laws) if law.poisson is None)
+        raise UserError(
+            f"region {wood!r} is not the same in all directions, and coarse elements of such have "
+            "no derivatives; choose all voxels (coarsen: none) or discretisation: finite-cell"
+        )
+    return coarsening
 
 
 class _FineElements(AnalysedElements):
     """Voxels."""
 
-    def __init__(self, mesh: HexMesh, constants: Constants) -> None:
-        self.model = fine_model(mesh, np.ones(mesh.n_cells), **constants)
+    model: ElasticModel
 
-    def slopes(self, young: Array, directions: Array) -> Array:
-        return np.repeat(directions, 8, axis=0)
+    def __init__(self, mesh: HexMesh, placed: PlacedRegions, supports: Supports | None) -> None:
+        self.model = fine_model(
+            mesh,
+            np.ones(mesh.n_cells),
+            placed.region,
+            regions=placed.regions,
+            supports=supports,
+        )
+        self.parts = _parts(self.model)
 
-    def strains(self, poisson: float) -> Array:
-        values, vectors = np.linalg.eigh(quadrature_stiffness(poisson))
+    def slopes(self, young: Array, directions: Array) -> list[Array]:
+        return self._by_part(np.repeat(directions, 8, axis=0))
+
+    def _by_part(self, slopes: Array) -> list[Array]:
+        """Derivatives (8 c, m) by part: those of a point are of its own region."""
+        region = self.model.region
+        if region is None:
+            return [slopes]
+        by_cell = slopes.reshape(len(region), 8, -1)
+        return [
+            np.where(
+                (region[part.cells] == part.region)[:, :, None], by_cell[part.cells], 0.0
+            ).reshape(-1, slopes.shape[1])
+            for part in self.parts
+        ]
+
+    def strains(self, law: Law) -> Array:
+        values, vectors = np.linalg.eigh(quadrature_stiffness(law))
         factors = np.sqrt(np.maximum(values, 0.0))[:, None, :] * vectors
         factors = np.sqrt(self.model.mesh.edge) * factors[:, :, -STRAINS:]
         return np.ascontiguousarray(factors.transpose(0, 2, 1))
 
 
+def _parts(model: ElasticModel) -> list[RegionElements]:
+    region = model.region
+    if region is None:
+        return [RegionElements(0, slice(None))]
+    return [
+        RegionElements(int(number), np.flatnonzero((region == number).any(axis=1)))
+        for number in np.unique(region)
+    ]
+
+
 class _CoarseElements(_FineElements):
     """Blocks of voxels with moduli by a coarsening."""
 
-    def __init__(self, mesh: HexMesh, coarsening: Coarsening, constants: Constants) -> None:
-        self._coarsening, self._constants = coarsening, constants
+    def __init__(
+        self,
+        mesh: HexMesh,
+        coarsening: Coarsening,
+        placed: PlacedRegions,
+        supports: Supports | None,
+    ) -> None:
+        self._coarsening, self._placed, self._supports = coarsening, placed, supports
         self._blocks = blocks_from_mesh(mesh)
         self.model = self._model(np.ones((self._blocks.coarse.n_cells, 8)))
+        self.parts = _parts(self.model)
 
-    def _model(self, moduli: Array) -> Solid:
-        fraction = self._coarsening.lumped_fraction
-        return coarse_model(self._blocks, moduli, fraction, **self._constants)
+    def _model(self, moduli: Array) -> ElasticModel:
+        return coarse_model(
+            self._blocks,
+            moduli,
+            self._coarsening.lumped_fraction,
+            self._placed.region,
+            regions=self._placed.regions,
+            supports=self._supports,
+        )
 
     def _moduli(self, young: Array) -> Array:
         return self._coarsening.moduli(block_moduli(self._blocks, young))
@@ -105,24 +189,49 @@ class _CoarseElements(_FineElements):
     def solve(self, solver: ModalSolver, young: Array, *how: Any) -> Modes:
         return partial(solver.solve, coarsened=True)(self._moduli(young), *how)
 
-    def slopes(self, young: Array, directions: Array) -> Array:
+    def slopes(self, young: Array, directions: Array) -> list[Array]:
         blocks = self._blocks
         _, rows = self._coarsening.moduli_with_derivatives(block_moduli(blocks, young))
         inside = np.where(blocks.mask[:, :, None], directions[blocks.fine_of_block], 0.0)
-        return np.asarray((rows @ inside).reshape(-1, directions.shape[1]))
+        return self._by_part((rows @ inside).reshape(-1, directions.shape[1]))
 
 
 class _CellElements(AnalysedElements):
     """Finite cells, whose stiffness is linear in the voxels' moduli."""
 
-    def __init__(self, cells: FiniteCells, constants: Constants) -> None:
-        self._cells = cells
+    model: FiniteCellModel
+
+    def __init__(
+        self, cells: FiniteCells, placed: PlacedRegions, supports: Supports | None
+    ) -> None:
         ones = np.ones(cells.mesh.n_cells)
-        self.model = finite_cell_model(cells, ones, constants["regions"])
+        self._cells = cells
+        self.model = finite_cell_model(
+            cells, ones, placed.regions, placed.region, placed.shared, supports
+        )
+        elements = self.model.elements
+        self._slots: list[Index] = []
+        self.parts: list[RegionElements] = []
+        if elements.law is None:
+            self.parts.append(RegionElements(0, slice(None)))
+            return
+        there = elements.shares.any(axis=2)
+        for number in np.unique(elements.law):
+            cell, slot = np.nonzero(there & (elements.law == number))
+            self._slots.append(slot)
+            self.parts.append(RegionElements(int(number), cell))
 
-    def slopes(self, young: Array, directions: Array) -> Array:
-        columns = [self._cells.point_values(along).ravel() for along in directions.T]
-        return np.stack(columns, axis=1)
+    def slopes(self, young: Array, directions: Array) -> list[Array]:
+        if self.model.region is None:
+            columns = [self._cells.point_values(along).ravel() for along in directions.T]
+            return [np.stack(columns, axis=1)]
+        # The stiffness is linear in the moduli, so that directions are moduli, too.
+        found = [np.empty((POINTS * len(slot), directions.shape[1])) for slot in self._slots]
+        for column, along in enumerate(directions.T):
+            moduli = self.model.linear_moduli(along)
+            for part, slot, own in zip(self.parts, self._slots, found, strict=True):
+                own[:, column] = moduli[part.cells, slot].ravel()
+        return found
 
-    def strains(self, poisson: float) -> Array:
-        return np.sqrt(2.0 * self.model.mesh.edge) * strain_factors(poisson)
+    def strains(self, law: Law) -> Array:
+        return np.sqrt(2.0 * self.model.mesh.edge) * strain_factors(law)

@@ -10,6 +10,7 @@ from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.model import ElasticModel, Solid, fine_model
+from carillon.limits import FEWEST_MODES
 from carillon.processes.threads import one_thread
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
@@ -95,16 +96,23 @@ def fine_frequencies(design: Design) -> FineFrequencies:
     if not is_coarsened(design):
         return FineFrequencies(design.coarse_frequencies, np.arange(count))
     mesh = hexmesh_from_grid(design.fine_grid, design.fine_origin, design.fine_edge)
-    model = fine_model(mesh, design.young, regions=design.model.regions)
-    options = SolverOptions(modes=model.rigid_modes + count, tolerance=FINE_TOLERANCE)
+    model = fine_model(
+        mesh,
+        design.young,
+        design.fine_region,
+        regions=design.model.regions,
+        supports=design.model.supports,
+    )
+    wanted = model.rigid_modes + count
+    options = SolverOptions(modes=max(FEWEST_MODES, wanted), tolerance=FINE_TOLERANCE)
     solver = ModalSolver(model, options, MPI.COMM_SELF)
     modes = solver.solve()
     rows = np.empty_like(modes.vectors)
     rows[degrees_of_freedom(solver.local_mesh.nodes)] = modes.vectors
     order = ShapeMatch(design.model, model).order(
-        design.modes[:, model.rigid_modes :], rows[:, model.rigid_modes :]
+        design.modes[:, model.rigid_modes :], rows[:, model.rigid_modes : wanted]
     )
-    return FineFrequencies(frequencies(modes.values[modes.rigid :]), order)
+    return FineFrequencies(frequencies(modes.values[modes.rigid : wanted]), order)
 
 
 def is_coarsened(design: Design) -> bool:

@@ -12,17 +12,19 @@ from carillon.fem.element import elasticity_matrix
 from carillon.fem.geometry import HexMesh
 from carillon.fem.laplacian import laplacian_modes
 from carillon.fem.moduli import require_moduli
+from carillon.fem.regions import Regions
+from sound.design.constants import NOTHING, FreeConstants
 
 LAWS = ("linear", "exponential")
 """Laws from the field Phi z to moduli, see `ReducedMaterial`."""
 KNEE = 0.1
-"""Modulus below which the linear law bends to stay positive, over the reference modulus.
+"""Factor below which the linear law bends to stay positive.
 
 Regression forests distinguish moduli in a block over about four decades; a far lower knee would
 only make cells without stiffness.
 """
 REACH = np.log(100.0)
-"""Natural logarithm of the largest modulus of the exponential law over the reference modulus."""
+"""Natural logarithm of the largest factor of the exponential law."""
 FIRST, SECOND = 0.0, 0.4
 """Poisson's ratios of the two elasticity matrices whose combinations are all others."""
 
@@ -31,36 +33,41 @@ FIRST, SECOND = 0.0, 0.4
 class ReducedMaterial:
     """Moduli of the cells as a function of reduced coordinates z (section 6, [XLCB15]).
 
-    `linear` is Y / Y0 = g(x) with x = 1 + Phi z, where g(x) = x above the knee k and k exp(x / k -
-    1) below it: the paper's Y = Phi z, continued smoothly to stay positive. `exponential` is Y / Y0
-    = exp(r tanh(Phi z / r)) with r = `REACH`, about exp(Phi z), for moduli that differ by decades.
+    Each is a factor times the modulus Y0 of the cell's region. `linear` is Y / Y0 = g(x) with x = 1
+    + Phi z, where g(x) = x above the knee k and k exp(x / k - 1) below it: the paper's Y = Phi z,
+    continued smoothly to stay positive. `exponential` is Y / Y0 = exp(r tanh(Phi z / r)) with r =
+    `REACH`, about exp(Phi z), for moduli that differ by decades.
 
     Neither frequencies relative to the first one nor balances of amplitudes depend on a factor
-    common to all moduli, so the constant part is not among the coordinates: z = 0 is the uniform
-    material Y0, of the modulus `young` [Pa].
+    common to all moduli, so the constant part is not among the coordinates: z = 0 is the material
+    as it is, of the moduli `young` [Pa], one or (M,). Where supports give the solid a scale of its
+    own, the `level` of all moduli is a coordinate, too, the last of these.
 
     Phi is `basis` (M, m), the modes of the Laplacian without the constant one, of root mean square
-    1, and `laplacian` (m,) their eigenvalues, the diagonal of Q in Eq. (4).  Poisson's ratio may be
-    free, a function of the last coordinate.  Moduli do not depend on that: its column of the basis
-    and its eigenvalue are 0.
+    1, and `laplacian` (m,) their eigenvalues, the diagonal of Q in Eq. (4).  Some constants of the
+    regions may be `free`, functions of the last coordinates.  Moduli do not depend on these: their
+    columns of the basis and their eigenvalues are 0.
     """
 
     basis: Array
     laplacian: Array
-    young: float
+    young: float | Array
     law: str
-    free_poisson: FreePoisson | None = None
+    free: FreeConstants = NOTHING
+    level: bool = False
 
     @classmethod
     def of_mesh(
         cls,
         mesh: HexMesh,
         dimensions: int,
-        young: float,
+        young: float | Array,
         law: str,
-        free_poisson: FreePoisson | None = None,
+        free: FreeConstants = NOTHING,
+        level: bool = False,
     ) -> ReducedMaterial:
-        """Reduction of the moduli of a mesh to `dimensions` coordinates, beside Poisson's ratio.
+        """Reduction of the moduli of a mesh to `dimensions` coordinates, and those of level and
+        constants.
 
         Raises UserError if the mesh has too few cells, the law is unknown or the modulus out of
         range.
@@ -76,9 +83,11 @@ class ReducedMaterial:
         values, modes = laplacian_modes(mesh, dimensions + 1)
         basis = np.sqrt(mesh.n_cells) * modes[:, 1:]
         values = np.maximum(values[1:], 0.0)
-        if free_poisson is not None:
-            basis, values = np.pad(basis, ((0, 0), (0, 1))), np.append(values, 0.0)
-        return cls(np.ascontiguousarray(basis), values, young, law, free_poisson)
+        if level:
+            basis = np.column_stack([basis, np.ones(mesh.n_cells)])
+        basis = np.pad(basis, ((0, 0), (0, len(free))))
+        values = np.pad(values, (0, basis.shape[1] - len(values)))
+        return cls(np.ascontiguousarray(basis), values, young, law, free, level)
 
     @property
     def dimensions(self) -> int:
@@ -94,24 +103,31 @@ class ReducedMaterial:
         bent = KNEE * np.exp(np.minimum(x, KNEE) / KNEE - 1.0)
         return np.asarray(self.young * np.where(x > KNEE, x, bent))
 
-    def poisson(self, z: Array) -> float | None:
-        """Poisson's ratio; None if it is fixed."""
-        return None if self.free_poisson is None else self.free_poisson.at(z[-1])
+    @property
+    def moving(self) -> int:
+        """Number of coordinates that moduli depend on, the first ones."""
+        return self.dimensions - len(self.free)
 
-    def coordinates(self, moduli: Array, poisson: float | None = None) -> Array:
+    def regions(self, z: Array, table: Regions) -> Regions:
+        """The materials of a table with the constants that z chooses."""
+        return self.free.regions(z[self.moving :], table)
+
+    def coordinates(self, moduli: Array, regions: Regions | None = None) -> Array:
         """Coordinates (m,) whose moduli are nearest to a multiple of `moduli` (M,) [Pa].
 
-        `poisson` is used if Poisson's ratio is free.
+        With a level they are nearest to these themselves. Free constants are those of `regions`.
         """
+        factor = moduli if np.ndim(self.young) == 0 and not self.level else moduli / self.young
         if self.law == "exponential":
-            level = np.log(moduli) - np.log(moduli).mean()
+            level = np.log(factor)
+            level = level if self.level else level - level.mean()
             reach = 0.999 * REACH
             field = REACH * np.arctanh(np.clip(level, -reach, reach) / REACH)
         else:
-            field = moduli / moduli.mean() - 1.0
+            field = (factor if self.level else factor / factor.mean()) - 1.0
         z = np.linalg.lstsq(self.basis, field, rcond=None)[0]
-        if self.free_poisson is not None and poisson is not None:
-            z[-1] = self.free_poisson.coordinate(poisson)
+        if len(self.free) and regions is not None:
+            z[self.moving :] = self.free.coordinates(regions)
         return np.asarray(z)
 
     def slopes(self, moduli: Array) -> Array:
@@ -124,35 +140,6 @@ class ReducedMaterial:
     def regulariser(self, z: Array) -> float:
         """R = 1/2 z^T Q z of Eq. (4)."""
         return float(0.5 * z @ (self.laplacian * z))
-
-
-@dataclass(frozen=True)
-class FreePoisson:
-    """Poisson's ratio between bounds, as a function of a coordinate; `start` belongs to 0."""
-
-    low: float
-    high: float
-    start: float
-
-    def at(self, coordinate: float) -> float:
-        """Poisson's ratio: a logistic function, so that it stays within the bounds."""
-        share = 1.0 / (1.0 + np.exp(-coordinate) * (self.high - self.start) / self._above)
-        return float(self.low + (self.high - self.low) * share)
-
-    def slope(self, poisson: float) -> float:
-        """Derivative of Poisson's ratio by the coordinate."""
-        return (poisson - self.low) * (self.high - poisson) / (self.high - self.low)
-
-    def coordinate(self, poisson: float) -> float:
-        """Inverse of `at`; ratios out of the bounds are moved into them."""
-        margin = 1e-3 * (self.high - self.low)
-        inside = float(np.clip(poisson, self.low + margin, self.high - margin))
-        odds = (inside - self.low) / (self.high - inside)
-        return float(np.log(odds * (self.high - self.start) / self._above))
-
-    @property
-    def _above(self) -> float:
-        return self.start - self.low
 
 
 def elasticity_slope(poisson: float) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from carillon.arrays import Array, Index
+from solver.files.modes_file import frequencies
 from solver.subspace.weyl import clusters
 from sound.design.pitch import bark, bark_slope
 
@@ -66,12 +67,20 @@ class Objective:
     """Eq. (1) to (4) for N elastic modes and T struck points, with the weights w_f, w_a and w_r.
 
     `targets` are the modes that the points shall have; `shift` (T, N) is added to their balances of
-    amplitudes.
+    amplitudes. Frequencies are relative to the first one, or as they are if `absolute`: those of a
+    solid whose supports give it a scale of its own.
     """
 
-    def __init__(self, targets: Targets, weights: Weights, shift: Array | None = None) -> None:
+    def __init__(
+        self,
+        targets: Targets,
+        weights: Weights,
+        shift: Array | None = None,
+        absolute: bool = False,
+    ) -> None:
         self.targets = targets
         self.weights = weights
+        self.absolute = absolute
         self._bark = bark(targets.frequencies)
         energies = _average(targets.frequencies, targets.amplitudes**2)
         self._target = np.sqrt(energies / np.maximum(energies.max(axis=1, keepdims=True), TINY))
@@ -79,8 +88,13 @@ class Objective:
             self._target = self._target + shift
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
-        """Bark differences (N - 1,) of the second mode to the last (Eq. 1)."""
-        return np.asarray(bark(self._scaled(eigenvalues)) - self._bark)[1:]
+        """Bark differences (N - 1,) of the second mode to the last (Eq. 1), (N,) if absolute."""
+        return np.asarray(bark(self._scaled(eigenvalues)) - self._bark)[self._first :]
+
+    @property
+    def _first(self) -> int:
+        """The first mode that has a difference."""
+        return 0 if self.absolute else 1
 
     def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
         """Differences (T, N) of the balances (Eq. 2, and the first mode)."""
@@ -97,11 +111,13 @@ class Objective:
         return DesignCost(total, frequency, amplitude, regulariser)
 
     def frequency_jacobian(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
-        """Derivatives (N - 1, m) of `frequency_residual`."""
+        """Derivatives (N - 1, m) of `frequency_residual`, (N, m) if absolute."""
         scaled = self._scaled(eigenvalues)
         relative = 0.5 * _slopes(eigenvalues, sensitivity) / eigenvalues
-        rows = (bark_slope(scaled) * scaled) * (relative - relative[:, :1])
-        return np.asarray(rows.T[1:])
+        if not self.absolute:
+            relative = relative - relative[:, :1]
+        rows = (bark_slope(scaled) * scaled) * relative
+        return np.asarray(rows.T[self._first :])
 
     def amplitude_jacobian(
         self, eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
@@ -117,7 +133,9 @@ class Objective:
         return np.asarray(0.5 * balance[:, :, None] * (relative - relative_peak[:, None, :]))
 
     def _scaled(self, eigenvalues: Array) -> Array:
-        """s_f f_i with s_f = F_1 / f_1."""
+        """s_f f_i with s_f = F_1 / f_1, or 1 if absolute."""
+        if self.absolute:
+            return frequencies(eigenvalues)
         return np.asarray(self.targets.frequencies[0] * np.sqrt(eigenvalues / eigenvalues[0]))
 
     def balance(self, eigenvalues: Array, pushed: Array) -> Array:

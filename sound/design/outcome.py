@@ -9,22 +9,23 @@ method; Johnson and Kienholz, AIAA Journal 20, 1982):
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, astuple, dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import HexMesh
-from carillon.fem.regions import Regions
+from carillon.fem.model import Solid
 from carillon.limits import DENSITIES
 from carillon.processes.threads import one_thread
 from solver.distribution.partition import partition_cells
 from solver.files.modes_file import frequencies
+from solver.response.dissipation import dissipation, is_known
 from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
@@ -112,22 +113,39 @@ class Outcome:
         evaluation, cost, targets = chosen.evaluation, chosen.cost, setting.objective.targets
         fine = chosen.fine
         hertz = frequencies(evaluation.eigenvalues) if fine is None else fine.frequencies
-        stretch = common_factor(hertz, targets.frequencies)
+        # Springs and masses of supports give the solid a scale of its own.
+        is_free = not setting.objective.absolute
+        stretch = common_factor(hertz, targets.frequencies) if is_free else 1.0
         moduli = stretch**2 * setting.material.moduli(evaluation.z)
-        density = problem.project.solid.density
-        heavier = weight(moduli, density, problem.project.material.young_bounds)
+        regions = simulation.regions(evaluation.z)
+        bounds = problem.project.material.young_bounds if is_free else None
+        heavier = weight(moduli, regions.density, bounds)
         young = heavier * moduli
+        model = simulation.elements.with_young(young).with_regions(regions.scaled(heavier, 1.0))
+        if model.supports is not None:
+            # What is held is so by springs as stiff as the solid is.
+            stiffness = heavier * stretch**2 * model.supports.stiffness
+            model = model.with_supports(replace(model.supports, stiffness=stiffness))
+        values = stretch**2 * evaluation.modes.values
+        modes = simulation.mesh_rows(evaluation.modes.vectors) / np.sqrt(heavier)
+        order = np.arange(len(hertz)) if fine is None else fine.order
         # One thread as in the search: sums over several threads round differently.
         with one_thread():
-            damping = material_damping(
-                simulation,
-                evaluation,
-                setting.mesh,
-                problem.project.damping.regions,
-                stretch * hertz,
-                np.arange(len(hertz)) if fine is None else fine.order,
-                targets.dampings,
-            )
+            if is_known(model):
+                rigid = evaluation.modes.rigid
+                damping = own_damping(
+                    model, values[rigid:], modes[:, rigid:], order, stretch * hertz
+                )
+            else:
+                damping = material_damping(
+                    simulation,
+                    evaluation,
+                    setting.mesh,
+                    problem.project.damping.regions,
+                    stretch * hertz,
+                    order,
+                    targets.dampings,
+                )
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
             "method": problem.project.optimiser.method,
@@ -151,11 +169,9 @@ class Outcome:
             targets=targets,
             coordinates=evaluation.z,
             young=young,
-            model=simulation.elements.with_young(young).with_regions(
-                Regions.one(simulation.poisson(evaluation.z), heavier * density)
-            ),
-            eigenvalues=stretch**2 * evaluation.modes.values,
-            modes=simulation.mesh_rows(evaluation.modes.vectors) / np.sqrt(heavier),
+            model=model,
+            eigenvalues=values,
+            modes=modes,
             surface_vertices=problem.vertices,
             surface_faces=problem.faces,
             fine_grid=setting.mesh.grid,
@@ -166,6 +182,7 @@ class Outcome:
             evidence=evidence,
             fine=None if fine is None else FineFrequencies(stretch * hertz, fine.order),
             damping=damping,
+            fine_region=None if setting.placed is None else setting.placed.region,
         )
 
 
@@ -175,9 +192,9 @@ def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:
     return np.array(rows, HISTORY_TYPE)
 
 
-def weight(moduli: Array, density: float, bounds: Sequence[float] | None) -> float:
-    """Factor of moduli (M,) [Pa] and density [kg/m^3], nearest to 1, for moduli within bounds (2,)
-    [Pa].
+def weight(moduli: Array, density: ArrayLike, bounds: Sequence[float] | None) -> float:
+    """Factor of moduli (M,) [Pa] and densities [kg/m^3], nearest to 1, for moduli within bounds
+    (2,) [Pa].
 
     Frequencies depend on moduli over density, so a factor common to both is free; the loudness of a
     design is that of its clips, whatever the density.  If the moduli span more than the bounds do,
@@ -195,7 +212,25 @@ def weight(moduli: Array, density: float, bounds: Sequence[float] | None) -> flo
         return 1.0
     least, most = bounds[0] / moduli.min(), bounds[1] / moduli.max()
     factor = np.clip(1.0, least, most) if least <= most else np.sqrt(least * most)
-    return float(np.clip(factor, DENSITIES[0] / density, DENSITIES[1] / density))
+    low, high = DENSITIES[0] / np.min(density), DENSITIES[1] / np.max(density)
+    return float(np.clip(factor, low, high))
+
+
+def own_damping(
+    model: Solid,
+    eigenvalues: Array,
+    elastic: Array,
+    order: NDArray[np.integer],
+    hertz: Array,
+) -> MaterialDamping:
+    """Dampings of modes by those of the regions, which are known.
+
+    The elastic modes (n_dofs, N) with numbers `order` (N,) have the frequencies `hertz` (N,) [Hz].
+    """
+    lost = dissipation(model, eigenvalues, elastic)
+    square = np.empty_like(eigenvalues)
+    square[order] = (2.0 * np.pi * hertz) ** 2
+    return MaterialDamping(None, 0.0, lost.decay_per_second(square)[order])
 
 
 def material_damping(

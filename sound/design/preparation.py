@@ -1,22 +1,34 @@
 """Preparation of a search from a project: targets, mesh, material and objective."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Surface
+from carillon.composition.composition import PlacedRegions
+from carillon.composition.entries import CompositionEntry, SolidFrame, compose
+from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
+from carillon.fem.elasticity import Elasticity
 from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import HexMesh
+from carillon.fem.model import fine_model
+from carillon.fem.regions import Regions
+from carillon.fem.supports import Supports
 from carillon.processes.threads import allowed_cores
 from solver.analysis.problem import ProblemOptions, discretised
 from solver.analysis.solid_surface import SolidSurface
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.clips.wav import read_wav
-from sound.design.material import FreePoisson, ReducedMaterial
+from sound.design.constants import NOTHING, FreeConstants, free_density, free_poisson
+from sound.design.elements import coarsening_of
+from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.tasks import Setting
 from sound.project.design import Design
@@ -58,35 +70,89 @@ def targets_of(project: Project) -> Targets:
 @dataclass(frozen=True)
 class PreparedSolid:
     """The solid of a search, without targets: its struck surface, its voxels, and their moduli as a
-    function of coordinates; finite cells with these voxels, or None.
+    function of coordinates; finite cells with these voxels, or None; its regions and what holds it,
+    if it has any, and whether that has springs or masses, which give the solid a scale of its own.
     """
 
     surface: Surface
     mesh: HexMesh
     material: ReducedMaterial
     cells: FiniteCells | None
+    placed: PlacedRegions | None = None
+    supports: Supports | None = None
+    has_scale: bool = False
+
+    def setting(
+        self, options: ProblemOptions, strikes: Sequence[Strike], objective: Objective
+    ) -> Setting:
+        """The setting of a search that strikes some points of it."""
+        return Setting(
+            self.mesh,
+            options,
+            self.material,
+            strikes,
+            objective,
+            self.cells,
+            self.placed,
+            self.supports,
+        )
 
 
 def prepared_solid(
-    solid: ProblemOptions, material: MaterialSettings, surface: Surface
+    solid: ProblemOptions,
+    material: MaterialSettings,
+    surface: Surface,
+    composition: CompositionEntry | None = None,
 ) -> PreparedSolid:
     """Voxels and reduced material of a solid whose `surface` is struck.
 
-    Raises UserError for anything wrong with the mesh or the numbers, or forests that are not for
-    all Poisson's ratios that are free.
+    Its regions and supports are those of the `composition`, whose files are as the working
+    directory has them. Raises UserError for anything wrong with the mesh or the numbers, or forests
+    that are not for all Poisson's ratios that are free.
     """
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
     loaded = SolidSurface.read(solid.mesh, solid.unit)
     mesh, cells = discretised(loaded, solid)
     loaded.doubt_unit()
-    bounds = material.poisson_bounds
-    for ratio in bounds or ():
-        replace(solid, poisson=ratio).coarsening()  # which refuses ratios that it is not for
-    free_poisson = None if bounds is None else FreePoisson(bounds[0], bounds[1], solid.poisson)
-    reduced = ReducedMaterial.of_mesh(
-        mesh, material.dimensions, material.young, material.law, free_poisson
+    finite = None if cells is None else cells.cells
+    frame = SolidFrame(solid.mesh, loaded.triangles, loaded.name, solid.unit)
+    composed = compose(composition or CompositionEntry(), frame)
+    table, placed = Regions.one(solid.poisson, solid.density), None
+    young: float | Array = material.young
+    if composed.composition is not None:
+        made = composed.composition
+        placed = made.of_voxels(mesh) if finite is None else made.of_cells(finite)
+        table = placed.regions
+        young = np.full(mesh.n_cells, 1.0) * table.moduli(placed.region)
+    has_scale = any(
+        part.spring is not None or part.pad is not None or part.mass for part in composed.supports
     )
-    return PreparedSolid(surface, mesh, reduced, None if cells is None else cells.cells)
+    free = _free_constants(solid, material, table, has_scale)
+    reduced = ReducedMaterial.of_mesh(
+        mesh, material.dimensions, young, material.law, free, has_scale
+    )
+    supports = None
+    if composed.supports:
+        nominal = reduced.moduli(np.zeros(reduced.dimensions))
+        finest = fine_model(mesh, nominal) if finite is None else finite_cell_model(finite, nominal)
+        supports = placed_supports(composed.supports, finest, loaded.triangles, loaded.name)
+    return PreparedSolid(surface, mesh, reduced, finite, placed, supports, has_scale)
+
+
+def _free_constants(
+    solid: ProblemOptions, material: MaterialSettings, table: Regions, has_scale: bool
+) -> FreeConstants:
+    coarsening_of(solid, table)
+    free = FreeConstants(
+        free_poisson(table, material.poisson_bounds, material.poisson_regions),
+        free_density(table, material.density_bounds, material.density_regions, has_scale),
+    )
+    rows = [row for each in free.poisson for row in each.rows]
+    for ratio in material.poisson_bounds or ():
+        law = Elasticity.isotropic(ratio)
+        laws = tuple(law if row in rows else own for row, own in enumerate(table.laws))
+        coarsening_of(solid, replace(table, laws=laws))  # which refuses ratios that it is not for
+    return free if len(free) else NOTHING
 
 
 def prepare(
@@ -105,10 +171,20 @@ def prepare(
     else:
         strikes = project.strikes(surface)
     project = replace(project, modes=len(targets.frequencies))
-    objective = Objective(targets, project.weights)
-    solid = solid or prepared_solid(project.solid, project.material, surface)
-    setting = Setting(solid.mesh, project.solid, solid.material, strikes, objective, solid.cells)
+    solid = solid or prepared_solid(project.solid, project.material, surface, project.composition)
+    objective = Objective(targets, project.weights, absolute=solid.has_scale)
+    setting = solid.setting(project.solid, strikes, objective)
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
+
+
+_MEANING: dict[str, Any] = {
+    "law": None,
+    "poisson_bounds": None,
+    "poisson_regions": [],
+    "density_bounds": None,
+    "density_regions": [],
+}
+"""Settings of the material that say what coordinates mean, with their values in old designs."""
 
 
 def require_same_voxels(problem: DesignProblem, initial: Design) -> None:
@@ -131,16 +207,14 @@ def coordinates_of(problem: DesignProblem, initial: Design) -> Array:
     """
     require_same_voxels(problem, initial)
     material = problem.setting.material
-    before = initial.settings.get("material", {})
-    now = problem.project.material
-    bounds = [
-        None if each is None else tuple(each)
-        for each in (before.get("poisson_bounds"), now.poisson_bounds)
-    ]
-    same = before.get("law") == now.law and bounds[0] == bounds[1]
+    before, now = initial.settings, problem.project.as_dict()
+    same = all(
+        before.get("material", {}).get(key, default) == now["material"][key]
+        for key, default in _MEANING.items()
+    ) and all(before.get(key, []) == now[key] for key in ("regions", "supports"))
     if same and len(initial.coordinates) == material.dimensions:
         return initial.coordinates
-    return material.coordinates(initial.young, initial.model.poisson)
+    return material.coordinates(initial.young, initial.model.regions)
 
 
 def usable_strikes(project: Project, surface: Surface) -> list[Strike]:

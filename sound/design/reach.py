@@ -17,6 +17,7 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import UserError
+from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.design.descent import DescentLimits
 from sound.design.objective import Objective, Sensitivity
@@ -81,11 +82,11 @@ class Reach:
 
 
 class SomeModes(Objective):
-    """Objective of the frequencies of some modes, 1 being the second one, relative to the first."""
+    """Objective of the frequencies of some modes, 1 being the second one."""
 
-    def __init__(self, targets: Targets, modes: Sequence[int]) -> None:
-        super().__init__(targets, Weights(1.0, 0.0, 0.0))
-        self._rows = np.array(modes) - 1
+    def __init__(self, targets: Targets, modes: Sequence[int], absolute: bool = False) -> None:
+        super().__init__(targets, Weights(1.0, 0.0, 0.0), None, absolute)
+        self._rows = np.array(modes) - self._first
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
         """Bark differences of the modes that count (Eq. 1)."""
@@ -98,11 +99,11 @@ class SomeModes(Objective):
 
 class _Known:
     """Materials whose modes are known, with distances `off` (k, N) [cents] of these above their
-    targets, the first mode being at its target.
+    targets, the first mode being at its target unless they are `absolute`.
     """
 
-    def __init__(self, targets: Array) -> None:
-        self._targets = targets
+    def __init__(self, targets: Array, absolute: bool) -> None:
+        self._targets, self._absolute = targets, absolute
         self._materials: list[Array] = []
         self.off = np.empty((0, len(targets)))
 
@@ -110,8 +111,8 @@ class _Known:
         for trial in trials:
             if trial.eigenvalues is not None:
                 self._materials.append(trial.z)
-                own = np.sqrt(trial.eigenvalues / trial.eigenvalues[0])
-                self.off = np.vstack([self.off, cents(own, self._targets / self._targets[0])])
+                own = distances(frequencies(trial.eigenvalues), self._targets, self._absolute)
+                self.off = np.vstack([self.off, own])
 
     def least(self, modes: Sequence[int]) -> float:
         """Least distance [cents] of some modes; 0 of a single one with materials on both sides."""
@@ -136,11 +137,12 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
     there are no modes to be had.
     """
     begin = time.monotonic()
-    targets = problem.setting.objective.targets.frequencies
-    own = cents(design.frequencies / design.frequencies[0], targets / targets[0])
-    missed = [mode for mode in range(1, len(targets)) if abs(own[mode]) > HAD_CENTS]
+    objective = problem.setting.objective
+    targets, first = objective.targets.frequencies, int(not objective.absolute)
+    own = distances(design.frequencies, targets, objective.absolute)
+    missed = [mode for mode in range(first, len(targets)) if abs(own[mode]) > HAD_CENTS]
     if not missed:
-        modes = [_judged(mode, own, targets) for mode in range(1, len(targets))]
+        modes = [_judged(mode, own, targets, first) for mode in range(first, len(targets))]
         return Reach(modes, len(targets), time.monotonic() - begin)
     limit = np.inf if seconds is None else seconds
     with _Descents(problem, descents) as search:
@@ -148,10 +150,22 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
             [coordinates_of(problem, design), *_samples(problem.setting.material.dimensions)]
         )
         together = search.together(begin + 0.5 * limit)
-        groups = [group for mode in missed for group in ((mode,), _beside(mode, len(targets)))]
+        groups = [
+            group for mode in missed for group in ((mode,), _beside(mode, len(targets), first))
+        ]
         search.approach(list(dict.fromkeys(groups)), begin + limit)
-    modes = [_judged(mode, own, targets, search) for mode in range(1, len(targets))]
+    modes = [_judged(mode, own, targets, first, search) for mode in range(first, len(targets))]
     return Reach(modes, together, time.monotonic() - begin)
+
+
+def distances(hertz: Array, targets: Array, absolute: bool) -> Array:
+    """Distances (N,) [cents] of frequencies (N,) above targets (N,).
+
+    Relative to the first mode's, unless they are `absolute`.
+    """
+    if absolute:
+        return cents(hertz, targets)
+    return cents(hertz / hertz[0], targets / targets[0])
 
 
 class _Descents:
@@ -163,10 +177,10 @@ class _Descents:
 
     def __init__(self, problem: DesignProblem, most: int) -> None:
         setting = problem.setting
-        self._targets = setting.objective.targets
+        self._targets, self._absolute = setting.objective.targets, setting.objective.absolute
         self._most = most
         self._pool = Pool(setting.fine() if setting.is_coarsened else setting, problem.workers)
-        self.known = _Known(self._targets.frequencies)
+        self.known = _Known(self._targets.frequencies, self._absolute)
         self.sought: set[tuple[int, ...]] = set()
 
     def __enter__(self) -> _Descents:
@@ -187,8 +201,9 @@ class _Descents:
     def together(self, deadline: float) -> int:
         """Number of modes from the first one on whose targets one material meets."""
         count = len(self._targets.frequencies)
-        for last in range(1, count):
-            group = tuple(range(1, last + 1))
+        first = int(not self._absolute)
+        for last in range(first, count):
+            group = tuple(range(first, last + 1))
             if self.known.least(group) > HAD_CENTS:
                 tasks = [self._task(group, rank, deadline) for rank in range(self._most)]
                 self._run(tasks, deadline)
@@ -208,7 +223,7 @@ class _Descents:
             self.known.best(group, rank),
             options=DESCENT,
             steps=STEPS,
-            objective=SomeModes(self._targets, group),
+            objective=SomeModes(self._targets, group, self._absolute),
             limits=DescentLimits(deadline),
         )
 
@@ -236,16 +251,18 @@ def _samples(size: int) -> list[Array]:
     return samples
 
 
-def _beside(mode: int, count: int) -> tuple[int, ...]:
-    """Numbers of a mode and its neighbours, without the first mode, which meets its target."""
-    return tuple(range(max(1, mode - 1), min(count, mode + 2)))
+def _beside(mode: int, count: int, first: int = 1) -> tuple[int, ...]:
+    """Numbers of a mode and its neighbours, without those that meet their targets by definition."""
+    return tuple(range(max(first, mode - 1), min(count, mode + 2)))
 
 
-def _judged(mode: int, own: Array, targets: Array, search: _Descents | None = None) -> ModeReach:
+def _judged(
+    mode: int, own: Array, targets: Array, first: int, search: _Descents | None = None
+) -> ModeReach:
     alone = beside = 0.0
     verdict = HAD
     if search is not None and abs(own[mode]) > HAD_CENTS:
-        neighbours = _beside(mode, len(targets))
+        neighbours = _beside(mode, len(targets), first)
         alone, beside = search.known.least((mode,)), search.known.least(neighbours)
         verdict = NOT_TOGETHER
         if beside > HAD_CENTS:

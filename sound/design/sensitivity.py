@@ -7,6 +7,9 @@ would have tiny denominators; they are left out of x_k, and their products u_i^T
 one by one.  `modal_truncation` adds the modes that were not computed.
 """
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -21,37 +24,45 @@ CLOSE = 1e-2
 """Greatest relative difference of the eigenvalues of close modes."""
 
 
+class LawElements(NamedTuple):
+    """Elements as far as they are of one elasticity."""
+
+    nodes: NDArray[np.integer]
+    strains: Array
+    """(c, k) nodes of the elements; (p, 6, 3 k), see
+    `sound.design.elements.AnalysedElements.strains`."""
+    slopes: Array
+    """(p c, m) derivatives of the moduli at the elements' points."""
+
+
 def projected_stiffness(
-    nodes: NDArray[np.integer],
-    strains: Array,
-    vectors: Array,
-    pairs: Index,
-    others: Array,
-    slopes: Array,
+    parts: Iterable[LawElements], vectors: Array, pairs: Index, others: Array, coordinates: int
 ) -> tuple[Array, Array]:
     """u_i^T (dK/dz) u_j (m, P) of pairs of modes, and u_i^T (dK/dz) x_i (m, T, N) with vectors x.
 
     Parameters
     ----------
-    nodes, strains : (c, k), (p, 6, 3 k)
-        Nodes of the elements; see `sound.design.elements.AnalysedElements.strains`.
+    parts
+        Elements of the solid.
     vectors, pairs : (3 n, N), (P, 2)
         Modes u, and their numbers i and j, see `close_pairs`.
     others : (3 n, T, N)
         Vectors x, T for each mode.
-    slopes : (p c, m)
-        Derivatives of the moduli at the elements' points.
+    coordinates
+        Their number m.
     """
-    count, struck, points = vectors.shape[1], others.shape[1], len(strains)
-    total = np.zeros((slopes.shape[1], len(pairs) + struck * count))
+    count, struck = vectors.shape[1], others.shape[1]
+    total = np.zeros((coordinates, len(pairs) + struck * count))
     columns = np.concatenate([vectors, others.reshape(len(vectors), -1)], axis=1)
-    flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
-    at_once = max(1, POINTS_AT_ONCE // points)
-    for first in range(0, len(nodes), at_once):
-        cells = nodes[first : first + at_once]
-        energies = np.empty((points * len(cells), total.shape[1]))
-        _pair_energies(cells, flat, columns, pairs, count, energies)
-        total += slopes[points * first : points * (first + len(cells))].T @ energies
+    for nodes, strains, slopes in parts:
+        points = len(strains)
+        flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
+        at_once = max(1, POINTS_AT_ONCE // points)
+        for first in range(0, len(nodes), at_once):
+            cells = nodes[first : first + at_once]
+            energies = np.empty((points * len(cells), total.shape[1]))
+            _pair_energies(cells, flat, columns, pairs, count, energies)
+            total += slopes[points * first : points * (first + len(cells))].T @ energies
     return total[:, : len(pairs)], total[:, len(pairs) :].reshape(len(total), struck, count)
 
 

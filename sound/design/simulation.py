@@ -1,20 +1,25 @@
 """Modes of a solid as functions of its material's coordinates, with derivatives."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import cast
+from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
+from carillon.composition.composition import PlacedRegions
 from carillon.errors import ConvergenceError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
+from carillon.fem.regions import Regions
+from carillon.fem.supports import Supports
+from carillon.limits import FEWEST_MODES
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
@@ -22,10 +27,17 @@ from solver.analysis.problem import ProblemOptions
 from solver.linear import Inverse, Lasting
 from solver.response.points import forces_at
 from sound.design.elements import analysed_elements
+from sound.design.masses import SolidModes, by_density, nodal_mass
 from sound.design.material import FIRST, SECOND, ReducedMaterial, elasticity_slope
 from sound.design.modal_truncation import lies_between, outside_response, shift_between
 from sound.design.objective import Sensitivity
-from sound.design.sensitivity import all_pairs, close_pairs, inside_response, projected_stiffness
+from sound.design.sensitivity import (
+    LawElements,
+    all_pairs,
+    close_pairs,
+    inside_response,
+    projected_stiffness,
+)
 from sound.strikes import Strike
 
 TOLERANCE = 1e-3
@@ -64,6 +76,8 @@ class Simulation:
         Constants, coarsening and forests; moduli as a function of the coordinates.
     strikes, tolerance
         Struck points; relative error of the eigenvalues.
+    placed, supports
+        Regions of the voxels, in place of the constants of the options, and what holds the solid.
 
     Attributes
     ----------
@@ -80,12 +94,15 @@ class Simulation:
         modes: int,
         tolerance: float = TOLERANCE,
         cells: FiniteCells | None = None,
+        placed: PlacedRegions | None = None,
+        supports: Supports | None = None,
     ) -> None:
         self.material = material
-        self.elements = analysed_elements(mesh, options, cells)
+        self.elements = analysed_elements(mesh, options, cells, placed, supports)
         self.modes = modes
         self.evaluations = 0
-        analysis = SolverOptions(modes=self.model.rigid_modes + modes, tolerance=tolerance)
+        self._kept = self.model.rigid_modes + modes
+        analysis = SolverOptions(modes=max(FEWEST_MODES, self._kept), tolerance=tolerance)
         self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
@@ -105,7 +122,8 @@ class Simulation:
         """
         self.evaluations += 1
         young = self.material.moduli(z)
-        modes = self.elements.solve(self.solver, young, start, self.material.poisson(z))
+        regions = self.regions(z) if len(self.material.free) else None
+        modes = _lowest(self.elements.solve(self.solver, young, start, regions), self._kept)
         elastic = modes.elastic
         similar = start.inverse if isinstance(start, Modes) else None
         own = None if modes.inverse is similar else modes.inverse
@@ -141,6 +159,7 @@ class Simulation:
         elastic = np.ascontiguousarray(evaluation.modes.elastic)
         directions = self.material.slopes(young)[:, None] * self.material.basis
         slopes = self.elements.slopes(young, directions)
+        regions, free = self.regions(evaluation.z), self.material.free
         values = evaluation.eigenvalues
         outside = outside_response(
             evaluation.modes, inverse, elastic, values, self._pushes, self._accuracy
@@ -149,38 +168,80 @@ class Simulation:
             outside += inside_response(elastic, values, evaluation.pushed)
         vectors, others = np.empty_like(elastic), np.empty_like(outside)
         vectors[self._order], others[self._order] = elastic, outside
-        nodes = self.model.connectivity
         pairs = all_pairs(len(values)) if whole else close_pairs(values)
-        strains = self.elements.strains(self.poisson(evaluation.z))
-        if self.material.free_poisson is not None:
-            strains, slopes = self._with_slope_of_poisson(evaluation.z, strains, slopes)
-        inside, beyond = projected_stiffness(nodes, strains, vectors, pairs, others, slopes)
+        # The moduli at the points are linear in a common factor.
+        moduli = self.elements.slopes(young, young[:, None]) if free.poisson else slopes
+        parts = self._parts(regions, slopes)
+        if free.poisson:
+            moves = {row for each in free.poisson for row in each.rows}
+            parts = (
+                self._with_slope_of_poisson(part.region, regions, own, at_points)
+                if part.region in moves
+                else own
+                for part, own, at_points in zip(self.elements.parts, parts, moduli)
+            )
+        size = self.material.dimensions
+        inside, beyond = projected_stiffness(parts, vectors, pairs, others, size)
+        if free.density:
+            self._add_densities(evaluation, regions, pairs, vectors, others, inside, beyond)
         return Sensitivity(pairs, inside, beyond)
 
-    def poisson(self, z: Array) -> float:
-        """Poisson's ratio at the coordinates z."""
-        own = self.material.poisson(z)
-        return cast(float, self.model.poisson) if own is None else own
+    def regions(self, z: Array) -> Regions:
+        """Materials of the regions at the coordinates z."""
+        return self.material.regions(z, self.model.regions)
 
     def _with_slope_of_poisson(
-        self, z: Array, strains: Array, slopes: Array
-    ) -> tuple[Array, Array]:
-        """Strains and slopes with those of Poisson's ratio added.
+        self, row: int, regions: Regions, part: LawElements, moduli: Array
+    ) -> LawElements:
+        """A region's elements with strains and slopes of Poisson's ratio added.
 
         The derivative of the stiffness by Poisson's ratio is a combination of the stiffnesses at
         two other ratios, whose strains are added as further points.
         """
-        poisson, free = self.poisson(z), self.material.free_poisson
-        assert free is not None
-        young = self.material.moduli(z)
-        # The moduli at the points are linear in a common factor.
-        moduli = self.elements.slopes(young, young[:, None]).reshape(-1, len(strains))
-        by_cell = np.zeros((len(moduli), 3, len(strains), slopes.shape[1]))
-        by_cell[:, 0] = slopes.reshape(len(moduli), len(strains), -1)
+        nodes, strains, slopes = part
+        poisson = regions.laws[row].poisson
+        assert poisson is not None
+        free = next(each.number for each in self.material.free.poisson if row in each.rows)
+        by_point = moduli.reshape(-1, len(strains))
+        by_cell = np.zeros((len(by_point), 3, len(strains), slopes.shape[1]))
+        by_cell[:, 0] = slopes.reshape(len(by_point), len(strains), -1)
         for place, weight in enumerate(elasticity_slope(poisson), start=1):
-            by_cell[:, place, :, -1] = free.slope(poisson) * weight * moduli
+            by_cell[:, place, :, self.material.moving] = free.slope(poisson) * weight * by_point
         further = [self.elements.strains(ratio) for ratio in (FIRST, SECOND)]
-        return np.concatenate([strains, *further]), by_cell.reshape(-1, slopes.shape[1])
+        together = np.concatenate([strains, *further])
+        return LawElements(nodes, together, by_cell.reshape(-1, slopes.shape[1]))
+
+    def _parts(self, regions: Regions, slopes: Sequence[Array]) -> Iterator[LawElements]:
+        """The elements by region, with the derivatives of their moduli."""
+        for part, own in zip(self.elements.parts, slopes, strict=True):
+            nodes = self.model.connectivity[part.cells]
+            yield LawElements(nodes, self.elements.strains(regions.laws[part.region]), own)
+
+    @cached_property
+    def _masses(self) -> list[sp.csr_matrix]:
+        """Nodal masses of regions whose density is free, for density 1."""
+        return [nodal_mass(self.model, each.rows) for each in self.material.free.density]
+
+    def _add_densities(
+        self,
+        evaluation: Evaluation,
+        regions: Regions,
+        pairs: Index,
+        elastic: Array,
+        others: Array,
+        inside: Array,
+        beyond: Array,
+    ) -> None:
+        """Set the rows of free densities in derivatives `inside` (m, P) and `beyond` (m, T, N)."""
+        rigid = evaluation.modes.vectors[:, : evaluation.modes.rigid]
+        pushed = self.mesh_rows(self._pushes)
+        modes = SolidModes(evaluation.eigenvalues, elastic, self.mesh_rows(rigid), pushed)
+        free = self.material.free
+        first = self.material.moving + free.first_density
+        for row, (each, mass) in enumerate(zip(free.density, self._masses, strict=True), first):
+            slope = each.number.slope(float(regions.density[each.rows[0]]))
+            products = by_density(mass, modes, pairs, others)
+            inside[row], beyond[row] = (slope * product for product in products)
 
     def energy_shares(self, evaluation: Evaluation, regions: NDArray[np.integer]) -> Array:
         """Shares (N, R) of R regions in the modes' strain energies, from the region (M,) of each
@@ -196,12 +257,11 @@ class Simulation:
         vectors = self.mesh_rows(evaluation.modes.elastic)
         count = vectors.shape[1]
         energies, _ = projected_stiffness(
-            self.model.connectivity,
-            self.elements.strains(self.poisson(evaluation.z)),
+            self._parts(self.regions(evaluation.z), self.elements.slopes(young, own)),
             vectors,
             all_pairs(count)[:count],
             np.empty((len(vectors), 0, count)),
-            self.elements.slopes(young, own),
+            own.shape[1],
         )
         return np.asarray((energies / evaluation.eigenvalues).T)
 
@@ -210,6 +270,20 @@ class Simulation:
         rows = np.empty_like(vectors)
         rows[self._order] = vectors
         return rows
+
+
+def _lowest(modes: Modes, count: int) -> Modes:
+    """The lowest so many modes; those beyond are of use to a start alone."""
+    if len(modes.values) <= count:
+        return modes
+    beyond = [modes.vectors[:, count:], *([] if modes.guard is None else [modes.guard])]
+    return replace(
+        modes,
+        values=modes.values[:count],
+        vectors=np.ascontiguousarray(modes.vectors[:, :count]),
+        residuals=modes.residuals[:count],
+        guard=np.concatenate(beyond, axis=1),
+    )
 
 
 def pushes(model: Solid, strikes: Sequence[Strike]) -> Array:

@@ -70,7 +70,7 @@ def aimed(objective: Objective, fine: FineModes) -> Objective:
         amplitudes=targets.amplitudes[:, order],
         residuals=(),
     )
-    return Objective(aims, objective.weights, fine.excess[:, order])
+    return Objective(aims, objective.weights, fine.excess[:, order], objective.absolute)
 
 
 class SpaceMapping:

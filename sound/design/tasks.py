@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.composition.composition import PlacedRegions
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.geometry import HexMesh
+from carillon.fem.supports import Supports
 from solver.analysis.problem import ProblemOptions
 from sound.design.descent import DescentLimits, DesignDescent
 from sound.design.local_search import LimitedMemory, StepOptions
@@ -33,6 +35,9 @@ class Setting:
     strikes: Sequence[Strike]
     objective: Objective
     cells: FiniteCells | None = None
+    placed: PlacedRegions | None = None
+    supports: Supports | None = None
+    """Regions of the voxels, and what holds the solid, if there are any."""
 
     @property
     def is_coarsened(self) -> bool:
@@ -47,7 +52,15 @@ class Setting:
         """Simulation of the solid, on all threads; of as many modes as targets if None."""
         modes = modes or len(self.objective.targets.frequencies)
         return Simulation(
-            self.mesh, self.options, self.material, self.strikes, modes, tolerance, self.cells
+            self.mesh,
+            self.options,
+            self.material,
+            self.strikes,
+            modes,
+            tolerance,
+            self.cells,
+            self.placed,
+            self.supports,
         )
 
 

@@ -9,6 +9,7 @@ from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 
 if TYPE_CHECKING:
+    from carillon.arrays import Array
     from sound.project.design import Design
 
 FORMATS = ("h5", "gltf", "glb", "dsp", "npy")
@@ -53,8 +54,25 @@ def export_design(
             from numpy import save
 
             with atomic_path(path) as temporary, open(temporary, "wb") as file:
-                save(file, design.young)
+                save(file, exported_moduli(design))
         case _:
             from sound.export.gltf import write_gltf
 
             write_gltf(path, design, binary=kind == "glb")
+
+
+def exported_moduli(design: Design) -> Array:
+    """Moduli (M,) [Pa] of the voxels as `carillon modes --material` takes them.
+
+    Those of a solid with regions are the factors on the regions' moduli, times 1 GPa.
+    """
+    if not has_table(design):
+        return design.young
+    from carillon.fem.materials import UNIFORM_YOUNG
+
+    return design.young / design.model.regions.moduli(design.fine_region) * UNIFORM_YOUNG
+
+
+def has_table(design: Design) -> bool:
+    """Whether a design names regions."""
+    return bool(design.settings.get("regions"))

@@ -41,6 +41,9 @@ UNITS = {
     "impulse": "N s",
     "density": "kg/m^3",
     "youngsModulus": "Pa",
+    "elasticity": "1, times youngsModulus; strains xx, yy, zz, xy, yz, zx, engineering shears",
+    "alpha": "1/s",
+    "beta": "s",
     "output": "full scale is 1",
 }
 FLOAT, UNSIGNED_INT = 5126, 5125
@@ -207,16 +210,46 @@ def _mass_properties(design: Design) -> dict[str, Any]:
 
 def _material(design: Design) -> dict[str, Any]:
     """Constants of the solid, without alpha and beta, as every mode has its own damping."""
+    regions = design.model.regions
+    poisson = regions.mean_poisson if regions.poisson is None else regions.poisson
+    several = {} if design.fine_region is None else {"regions": _regions(design)}
+    if not several and not regions.is_isotropic:
+        several["regions"] = _regions(design)
     return {
         "name": "designed",
         "density": design.model.density,
         "youngsModulus": float(design.young.mean()),
-        "poissonRatio": design.model.poisson,
+        "poissonRatio": poisson,
         "extras": {
             "youngsModulus": "mean over the volume; it varies between "
-            f"{design.young.min():.6g} and {design.young.max():.6g} Pa"
+            f"{design.young.min():.6g} and {design.young.max():.6g} Pa",
+            **several,
         },
     }
+
+
+def _regions(design: Design) -> list[dict[str, Any]]:
+    """Materials of the regions, wood of several directions a row for each."""
+    table, rows = design.model.regions, design.fine_region
+    found = []
+    for row, name in enumerate(table.names):
+        young = design.young if rows is None else design.young[rows == row]
+        law = table.laws[row]
+        own: dict[str, Any] = {"name": name, "density": float(table.density[row])}
+        if len(young):
+            own |= {
+                "youngsModulus": float(young.mean()),
+                "youngsModulusRange": [float(young.min()), float(young.max())],
+            }
+        if law.poisson is not None:
+            own["poissonRatio"] = law.poisson
+        else:
+            own["elasticity"] = law.matrix.tolist()
+        damping = table.damping[row]
+        if damping is not None:
+            own |= {"alpha": damping[0], "beta": damping[1]}
+        found.append(own)
+    return found
 
 
 def _strike_nodes(design: Design, listening: Listening) -> list[dict[str, Any]]:

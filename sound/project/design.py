@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Integers
 from carillon.errors import UserError
 from carillon.fem.model import ElasticModel, Solid
+from carillon.fem.regions import RegionOf
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.strikes import Strike
@@ -41,14 +42,16 @@ class FineFrequencies:
 
 @dataclass(frozen=True)
 class MaterialDamping:
-    """Dampings by loss factors of the material.
+    """Dampings by the material.
 
-    `loss_factors` (M,) are those of the fine cells, `mass_per_second` [1/s] the coefficient of mass
-    damping, as by air, half of which is part of every damping.  `dampings` (N,) [1/s] are d of the
-    elastic modes, in the order of `Design.frequencies`.
+    `loss_factors` (M,) are those of the fine cells, found for the clips' dampings, and
+    `mass_per_second` [1/s] the coefficient of mass damping, as by air, half of which is part of
+    every damping.  Where the regions' own damping is known, it is what counts: there are no such
+    factors then.  `dampings` (N,) [1/s] are d of the elastic modes, in the order of
+    `Design.frequencies`.
     """
 
-    loss_factors: Array
+    loss_factors: Array | None
     mass_per_second: float
     dampings: Array
 
@@ -90,6 +93,8 @@ class Design:
     """Frequencies of the fine solid; None if they were not computed."""
     damping: MaterialDamping | None = None
     """Loss factors of the material, and dampings by them; None in old designs."""
+    fine_region: RegionOf | None = None
+    """(M,) region of each fine cell, a row of the model's regions; None if there is one."""
 
     @property
     def unit(self) -> float:
@@ -171,10 +176,11 @@ def fault(design: Design) -> str:
             ("order of fine modes", design.fine.order, (N,)),
         ]
     if design.damping is not None:
-        expected += [
-            ("loss factors", design.damping.loss_factors, (len(design.young),)),
-            ("dampings of the material", design.damping.dampings, (N,)),
-        ]
+        expected.append(("dampings of the material", design.damping.dampings, (N,)))
+        if design.damping.loss_factors is not None:
+            expected.append(("loss factors", design.damping.loss_factors, (len(design.young),)))
+    if design.fine_region is not None:
+        expected.append(("regions of fine cells", design.fine_region, (len(design.young),)))
     for name, data, shape in expected:
         own = (len(data),) if isinstance(data, (list, tuple)) else data.shape
         if not _matches(own, shape):
@@ -186,6 +192,11 @@ def fault(design: Design) -> str:
             return f"holds {name} that are no finite real numbers"
     if design.fine is not None and sorted(design.fine.order) != list(range(N)):
         return "names other coarse modes of its fine ones than each once"
+    if (design.fine_region is None) != (design.model.region is None):
+        return "names the regions of one of its two solids only"
+    rows = 0 if design.fine_region is None else design.fine_region
+    if np.max(rows) >= len(design.model.regions) or np.min(rows) < 0:
+        return "names regions of fine cells that are not there"
     count = len(design.surface_vertices)
     named = [design.surface_faces.min(), design.surface_faces.max()]
     for vertex in (*named, *(strike.vertex for strike in design.strikes)):

@@ -66,6 +66,8 @@ def put_object(file: h5py.File, design: Design) -> None:
         put(file, "fine/order", design.fine.order, "1", "coarse elastic mode of the same shape")
     if design.damping is not None:
         _put_damping(file["fine"], design.damping)
+    if design.fine_region is not None:
+        put(file, "fine/region", design.fine_region, "1", "region of the fine cells")
 
 
 def read_design(path: str | Path) -> Design:
@@ -97,6 +99,7 @@ def read_design(path: str | Path) -> Design:
             if "frequencies" in fine
             else None,
             _get_damping(fine),
+            fine["region"][()].astype(np.uint16) if "region" in fine else None,
         )
     wrong = fault(design)
     if wrong:
@@ -105,15 +108,20 @@ def read_design(path: str | Path) -> Design:
 
 
 def _put_damping(group: h5py.Group, damping: MaterialDamping) -> None:
-    put(group, "loss_factors", damping.loss_factors, "1", "loss factor of the fine cells")
-    mass = np.array([damping.mass_per_second])
-    put(group, "mass_per_second", mass, "1/s", "twice the damping that all modes have in common")
-    put(group, "dampings", damping.dampings, "1/s", "of the elastic modes, by these two")
+    if damping.loss_factors is not None:
+        put(group, "loss_factors", damping.loss_factors, "1", "loss factor of the fine cells")
+        mass = np.array([damping.mass_per_second])
+        put(
+            group, "mass_per_second", mass, "1/s", "twice the damping that all modes have in common"
+        )
+    put(group, "dampings", damping.dampings, "1/s", "of the elastic modes, by the material")
 
 
 def _get_damping(group: h5py.Group) -> MaterialDamping | None:
-    if "loss_factors" not in group:
+    if "dampings" not in group:
         return None
+    if "loss_factors" not in group:
+        return MaterialDamping(None, 0.0, group["dampings"][()])
     mass = float(group["mass_per_second"][0])
     return MaterialDamping(group["loss_factors"][()], mass, group["dampings"][()])
 

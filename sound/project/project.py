@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from carillon.arrays import Surface
 from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.composition.entries import CompositionEntry, RegionEntry, SupportEntry
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.model import DEFAULT_DENSITY
 from carillon.parameters import REQUIRED, OneOf, Within, option, parameters
@@ -53,10 +54,19 @@ class Project:
     components: Components = option("error")
     poisson: PoissonRatio = option(DEFAULT_POISSON)
     density: Density = option(DEFAULT_DENSITY)
+    regions: Annotated[tuple[RegionEntry, ...], Within(max_length=1000)] = option(
+        (),
+        "what the solid is made of, in place of poisson, density and material.young: regions in "
+        "their order, of several in one place the last one counts; a search finds a factor on "
+        "their moduli",
+    )
+    supports: Annotated[tuple[SupportEntry, ...], Within(max_length=1000)] = option(
+        (), "what holds the solid, or is fixed to it; it is free if there are none"
+    )
     coarsen: Annotated[str, OneOf(AUTO, "none", *LINEAR, FOREST)] = option(
         AUTO,
         "how the mesh that is simulated is made from the voxels; none simulates them all, auto is "
-        "ddfem for voxels and none for finite cells",
+        "ddfem for voxels, and none for finite cells and regions of wood",
     )
     discretisation: Discretisation = option("voxel")
     forest: File | None = option(
@@ -81,20 +91,43 @@ class Project:
     )
 
     def __post_init__(self) -> None:
+        if self.regions:
+            self._require_regions_alone()
+        if self.coarsen == AUTO and not self.composition.is_isotropic:
+            object.__setattr__(self, "coarsen", "none")
         object.__setattr__(self, "coarsen", self.solid.coarsen)
         bounds = self.material.poisson_bounds
         place = ("material", "poisson_bounds")
-        if bounds is not None and not bounds[0] < self.poisson < bounds[1]:
+        if bounds is not None and not self.regions and not bounds[0] < self.poisson < bounds[1]:
             raise ParameterError(
                 place,
                 f"found {list(bounds)}, expected poisson, which the search starts from, between "
                 f"them; it is {self.poisson:g}",
             )
 
+    def _require_regions_alone(self) -> None:
+        """Refuse what the regions say already."""
+        material = self.material.young, parameters_of(MaterialSettings)["young"].default
+        for place, value, default in (
+            (("poisson",), self.poisson, DEFAULT_POISSON),
+            (("density",), self.density, DEFAULT_DENSITY),
+            (("material", "young"), *material),
+        ):
+            if value != default:
+                raise ParameterError(
+                    place, f"found {value:g} beside regions, which tell it; leave one of them out"
+                )
+
+    @property
+    def composition(self) -> CompositionEntry:
+        """Regions and supports."""
+        return CompositionEntry(self.regions, self.supports)
+
     @property
     def solid(self) -> ProblemOptions:
-        """The solid to analyse, by the keys that both have but the material."""
-        shared = (parameters_of(ProblemOptions).keys() & parameters_of(Project)) - {"material"}
+        """The solid to analyse, by the keys that both have but the material and the regions."""
+        own = {"material", "regions"}
+        shared = (parameters_of(ProblemOptions).keys() & parameters_of(Project)) - own
         return ProblemOptions(**{key: getattr(self, key) for key in shared})
 
     def as_dict(self) -> dict[str, Any]:
@@ -146,6 +179,14 @@ def _in_folder(project: Project, folder: Path) -> Project:
     return replace(
         project,
         mesh=str(folder / project.mesh) if is_file else project.mesh,
+        regions=tuple(_region_in_folder(each, folder) for each in project.regions),
         forest=None if project.forest is None else str(folder / project.forest),
         targets=tuple(replace(each, clip=str(folder / each.clip)) for each in project.targets),
     )
+
+
+def _region_in_folder(region: RegionEntry, folder: Path) -> RegionEntry:
+    def there(file: str | None) -> str | None:
+        return file if file is None or file.startswith(BUILTIN_PREFIX) else str(folder / file)
+
+    return replace(region, mesh=there(region.mesh), labels=there(region.labels))

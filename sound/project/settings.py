@@ -4,6 +4,7 @@ from typing import Annotated
 
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.quantities import (
+    Density,
     File,
     Pair,
     Point,
@@ -27,6 +28,7 @@ ModeCount = Annotated[int, between(1, 10_000)]
 Dampings = Annotated[str, OneOf("clips", "material")]
 """Where dampings of a design come from."""
 OptimiserMethod = Annotated[str, OneOf("hybrid", "cma", "bfgs")]
+RegionNames = Annotated[tuple[ShownName, ...], Within(max_length=1000)]
 Frequency = Annotated[float, Within(gt=0.0, le=1e6)]
 Weight = Annotated[float, between(0.0, 1e9)]
 
@@ -87,7 +89,18 @@ class MaterialSettings:
         None,
         "lowest and highest Poisson's ratio of the whole, which is then sought, too, from the one "
         "of poisson on; forests must be for all between, as those of the package are from 0 on. "
-        "It is kept if null [1]",
+        "It is kept if null; those of regions each start from their own and move together [1]",
+    )
+    poisson_regions: RegionNames = option(
+        (), "regions whose Poisson's ratio is sought; all isotropic ones if none is named"
+    )
+    density_bounds: Annotated[Pair[Density], Check(_ascending)] | None = option(
+        None,
+        "lowest and highest density of regions, each of which is then sought, too, from its own "
+        "on; they are kept if null [kg/m^3]",
+    )
+    density_regions: RegionNames = option(
+        (), "regions whose density is sought; all if none is named"
     )
 
 
@@ -97,8 +110,9 @@ class DampingSettings:
 
     source: Dampings = option(
         "clips",
-        "where the dampings that sound come from, clips or material; the latter are those of loss "
-        "factors that are found after the search and come as near to the clips' as they can",
+        "where the dampings that sound come from, clips or material; the latter are those of the "
+        "regions if they are known, else those of loss factors that are found after the search and "
+        "come as near to the clips' as they can",
     )
     regions: Annotated[int, between(1, 100)] = option(
         4, "regions of the solid that have a loss factor each [1]"

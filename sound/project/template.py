@@ -27,7 +27,7 @@ def project_text(values: Mapping[str, Any]) -> str:
 def _entry(key: str, part: Mapping[str, Any], values: Mapping[str, Any]) -> Iterator[str]:
     """Lines of a key: what it means, then its name and value, or the keys below it."""
     yield f"# {_meaning(part)}"
-    if "properties" in part.get("items", {}):
+    if "properties" in part.get("items", {}) and values.get(key):
         yield f"{key}:"
         yield from _items(part["items"]["properties"], values[key])
         return

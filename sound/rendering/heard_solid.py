@@ -81,8 +81,9 @@ def open_heard_solid(
 
 
 def heard_modes(file: ModesFile, damping: Sequence[float] | None = None) -> HeardSolid:
-    """The solid of any modes file, with Rayleigh damping: that given, its own, or the default."""
-    rayleigh = Damping(*(damping or file.model.damping or ()))
+    """The solid of any modes file, with Rayleigh damping: that given, its regions', or the
+    default."""
+    rayleigh = None if damping is None else Damping(*damping)
     return HeardSolid(SoundingSolid.of_modes(file, rayleigh), None, _places_of_model(file.model))
 
 

@@ -11,8 +11,8 @@ from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
 from solver.files.modes_file import ModesFile
+from solver.response.dissipation import decays
 from solver.response.points import motion_at
-from solver.response.region_damping import ModalDamping
 from solver.response.response import Damping
 from solver.subspace.weyl import clusters
 from sound.project.design import Design
@@ -40,27 +40,24 @@ class SoundingSolid:
         return cls(design.frequencies, design.dampings, design.model, design.elastic_modes)
 
     @classmethod
-    def of_modes(cls, file: ModesFile, damping: Damping | ModalDamping) -> SoundingSolid:
-        """A solid of any modes file with Rayleigh damping; see `damped`."""
+    def of_modes(cls, file: ModesFile, damping: Damping | None = None) -> SoundingSolid:
+        """A solid of any modes file; see `damped`."""
         assert file.modes is not None
         return cls.damped(file.model, file.eigenvalues, file.modes, damping)
 
     @classmethod
     def damped(
-        cls,
-        model: Solid,
-        eigenvalues: Array,
-        modes: Array,
-        damping: Damping | ModalDamping,
+        cls, model: Solid, eigenvalues: Array, modes: Array, damping: Damping | None = None
     ) -> SoundingSolid:
         """A solid with Rayleigh damping, without rigid modes and overdamped ones.
 
-        Its eigenvalues (k,) [rad^2/s^2] and modes (n_dofs, k) [kg^-1/2] ascend, those of the rigid
+        Without a damping each of its regions has its own, see `solver.response.dissipation`. Its
+        eigenvalues (k,) [rad^2/s^2] and modes (n_dofs, k) [kg^-1/2] ascend, those of the rigid
         motions first.  Raises UserError if none is left.
         """
         rigid = model.rigid_modes
         values = eigenvalues[rigid:]
-        decay = damping.decay_per_second(values)
+        decay = decays(model, values, modes[:, rigid:], damping)
         square = values - decay**2
         kept = np.flatnonzero(square > 0.0)
         if not len(kept):

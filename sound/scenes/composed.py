@@ -23,7 +23,6 @@ from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid, fine_model
 from carillon.fem.regions import Damping as Coefficients
 from carillon.fem.regions import Regions
-from solver.response.region_damping import ModalDamping, damping_of_regions
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.solved import Discretised, SolvedSolid, discretised, kept, with_modes
 from sound.scenes.touched import touched_material
@@ -108,11 +107,6 @@ class ComposedObject:
         step = INWARDS * float(np.max(surface.extents))
         return self.composition.parts_at(vertices + step * inward_normals(surface, vertices))
 
-    def damping(self, solid: SolvedSolid) -> ModalDamping:
-        """Damping of its elastic modes."""
-        assert solid.eigenvalues is not None and solid.modes is not None
-        return modal_damping(solid.model, solid.eigenvalues, solid.modes)
-
 
 def _names() -> Sequence[str]:
     return [REST, *(f"{REST} {number}" for number in range(2, 1002))]
@@ -127,14 +121,6 @@ def losing(model: Solid, by_name: Mapping[str, Coefficients]) -> Solid:
     regions = model.regions
     damping = tuple(by_name[name] for name in regions.names)
     return model.with_regions(replace(regions, damping=damping))
-
-
-def modal_damping(model: Solid, eigenvalues: Array, modes: Array) -> ModalDamping:
-    """Damping of the elastic modes of all (k,), (n_dofs, k) by that of each of the regions."""
-    rigid = model.rigid_modes
-    coefficients = [damping for damping in model.regions.damping if damping is not None]
-    elastic = np.ascontiguousarray(modes[:, rigid:])
-    return damping_of_regions(model, eigenvalues[rigid:], elastic, coefficients)
 
 
 def _moduli(placed: PlacedRegions, mesh: HexMesh) -> Array:

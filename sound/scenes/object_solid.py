@@ -15,12 +15,11 @@ from carillon.files.hdf5 import kind_of
 from carillon.limits import EXTENTS
 from solver.files.modes_file import ModesFile, read_modes, require_same_solid
 from solver.refinement.errors import FROM_SOLID
-from solver.response.region_damping import ModalDamping
 from solver.response.response import Damping
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
-from sound.scenes.composed import ComposedObject, losing, modal_damping
+from sound.scenes.composed import ComposedObject, losing
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.solved import Discretised
 from sound.scenes.touched import touched_in_file, young_near
@@ -126,7 +125,7 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
         touched.poisson,
         touched.materials,
         touched.which,
-        SoundingSolid.of_modes(heard, _damping_of(entry, heard)),
+        _heard(entry, heard),
         file.attributes.get("mesh", ""),
         accuracy=accuracy or None,
         volume=_volume(file.model),
@@ -134,18 +133,18 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
     )
 
 
-def _damping_of(entry: ObjectEntry, file: ModesFile) -> Damping | ModalDamping:
-    """Damping of the modes of a file: that of its regions, where it tells, or the object's own."""
+def _heard(entry: ObjectEntry, file: ModesFile) -> SoundingSolid:
+    """Modes of a file, damped as its regions, where it tells, or as the object says."""
     regions, own = file.model.regions, entry.made_of
     told = file.model.region is not None or entry.material is None
     if entry.damping is not None or not told or not any(regions.damping):
-        return _damping(entry)
+        return SoundingSolid.of_modes(file, _damping(entry))
     assert file.modes is not None
     by_name = {
         name: damping or (own.alpha, own.beta)
         for name, damping in zip(regions.names, regions.damping)
     }
-    return modal_damping(losing(file.model, by_name), file.eigenvalues, file.modes)
+    return SoundingSolid.damped(losing(file.model, by_name), file.eigenvalues, file.modes)
 
 
 def _volume(model: Solid) -> float | None:
@@ -249,7 +248,7 @@ def _of_parts(entry: ObjectEntry, mesh: str) -> ObjectSolid:
         poisson,
         of_parts,
         which,
-        solid.sounding(composed.damping(solid)) if entry.count else None,
+        solid.sounding(),
         mesh,
         accuracy=solid.accuracy if entry.count else None,
         volume=_volume(solid.model),

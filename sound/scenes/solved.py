@@ -24,7 +24,6 @@ from solver.accuracy.voxels import Reference, covering_on, voxel_lattice
 from solver.analysis.problem import AUTO
 from solver.files.modes_file import read_modes, write_modes
 from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors
-from solver.response.region_damping import ModalDamping
 from solver.response.response import Damping
 from sound.rendering.solid import SoundingSolid
 
@@ -92,8 +91,8 @@ class SolvedSolid:
         first = float(np.sqrt(self.eigenvalues[self.model.rigid_modes]))
         return first / (2.0 * np.pi * pitch)
 
-    def sounding(self, damping: Damping | ModalDamping) -> SoundingSolid | None:
-        """The solid with its modes, damped; None without modes."""
+    def sounding(self, damping: Damping | None = None) -> SoundingSolid | None:
+        """The solid with its modes, damped, or as its regions are if None; None without modes."""
         if self.eigenvalues is None or self.modes is None:
             return None
         return SoundingSolid.damped(self.model, self.eigenvalues, self.modes, damping)

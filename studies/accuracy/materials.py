@@ -39,6 +39,8 @@ TOLERANCE = 1e-9
 """Relative error of the eigenvalues."""
 DEGREES = (11, 11, 11)
 """Polynomial degrees of the boxes' reference."""
+SLENDER = 20.0
+"""Ratio of sides beyond which half as many spacings do."""
 SHEAR = 5.0 / 6.0
 """Timoshenko's factor of a rectangle."""
 STEEL = named_material("steel").region("steel")
@@ -108,9 +110,10 @@ def _error(case: Case, way: str, spacing: int, exact: Array) -> dict[str, Any]:
 
 
 def discretised(case: Case, way: str, spacing: int) -> Solid:
-    """The solid with this many lattice spacings along its second side."""
+    """The solid with this many lattice spacings along its second side; slender ones have half."""
     surface = box(extents=case.sides)
-    resolution = round(spacing * max(case.sides) / case.sides[1])
+    slenderness = max(case.sides) / case.sides[1]
+    resolution = round(spacing * slenderness / (2.0 if slenderness > SLENDER else 1.0))
     regions = [MaterialRegion(*part) for part in case.parts]
     composition = Composition(regions, case.name, ClosedSurface(surface))
     solid: Solid

@@ -32,13 +32,13 @@ from carillon.fem.supports import Attached, Supports
 class CellElements(Elements):
     """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside."""
 
-    ROWS = ("young", "share", "law", "span", "kinds", "kink", "support")
+    ROWS = ("young", "shares", "law", "span", "kinds", "kink", "support")
 
     young: Array
     """(c, s, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`, of
     what the cell holds of each of its regions."""
-    share: Array
-    """(c, 125) the same of the density over that of the first region."""
+    shares: Array
+    """(c, s, 125) the points' weights of what the cell holds of each of its regions."""
     edge: float
     """Step of the lattice [m]."""
     regions: Regions
@@ -100,6 +100,10 @@ class CellElements(Elements):
             found.append((int(number), cell, young[cell, slot]))
         return found
 
+    def moduli_of(self, chosen: Flags) -> Array:
+        there = chosen[0] if self.law is None else chosen[self.law][:, :, None]
+        return np.asarray(np.where(there, self.young, 0.0))
+
     def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
         edges = self.edges(chosen)
         parts = self.by_law(chosen)
@@ -125,9 +129,21 @@ class CellElements(Elements):
             self.kinks.add_stiffness(kink[own], moduli, changed)
             matrices[own] = changed
 
+    @cached_property
+    def share(self) -> Array:
+        """(c, 125) weighted densities at the points, over that of the first region."""
+        return self._share(slice(None))
+
+    def _share(self, chosen: Chosen) -> Array:
+        shares = self.shares[chosen]
+        if self.law is None:
+            return shares[:, 0]
+        ratios = (self.regions.density / self.regions.density[0])[self.law[chosen]]
+        return np.einsum("cs,csp->cp", ratios, shares)
+
     def _nodal_mass(self, chosen: Chosen) -> Array:
         scale = float(self.regions.density[0]) * self.edges(chosen) ** 3
-        matrices = (scale * self.share[chosen]) @ point_mass()
+        matrices = (scale * self._share(chosen)) @ point_mass()
         return self._between_nodes(matrices.reshape(-1, 27, 27), chosen)
 
 
@@ -155,13 +171,13 @@ class FiniteCellModel(Solid):
     def elements(self) -> CellElements:
         # Made once, since the weights of all cells go into them.
         young, law = self._point_moduli(self.young)
-        share = self._shares()
+        shares = self._shares()
         span = self.cells.span if self.cells.is_mixed else None
         support, attached = self.attached()
         kink, kinks = self._kinks()
         return CellElements(
             young,
-            share,
+            shares,
             self.mesh.edge,
             self.regions,
             law,
@@ -183,6 +199,10 @@ class FiniteCellModel(Solid):
         kink[kinks.borders.cell] = np.arange(len(kinks.borders))
         return kink, kinks
 
+    def linear_moduli(self, along: Array) -> Array:
+        """Moduli (c, s, 125) at the points of cells, of voxels' (m,) that may be negative."""
+        return self._point_moduli(along)[0]
+
     def _point_moduli(self, young: Array) -> tuple[Array, RegionOf | None]:
         if self.region is None:
             return self.cells.point_values(young)[:, None], None
@@ -190,8 +210,8 @@ class FiniteCellModel(Solid):
 
     def _shares(self) -> Array:
         if self.region is None:
-            return self.cells.point_values(np.ones(self.mesh.n_cells))
-        return point_shares(self.cells, self.regions, self.region, self.shared)
+            return self.cells.point_values(np.ones(self.mesh.n_cells))[:, None]
+        return point_shares(self.cells, self.region, self.shared)
 
     @property
     def connectivity(self) -> NDArray[np.int32]:
@@ -217,7 +237,7 @@ class FiniteCellModel(Solid):
         if self.region is None:
             return float(self.regions.density[0]) * self.cells.volume
         edges = self.cells.span * self.mesh.edge
-        volumes = self._shares().sum(axis=1) * edges**3
+        volumes = self.elements.share.sum(axis=1) * edges**3
         return float(self.regions.density[0] * volumes.sum())
 
     @property

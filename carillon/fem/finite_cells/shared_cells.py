@@ -93,13 +93,10 @@ def point_moduli(
     return point_values(cells, region, shared, young, of_part)
 
 
-def point_shares(
-    cells: FiniteCells, regions: Regions, region: RegionOf, shared: SharedCells | None
-) -> Array:
-    """Weighted densities (c, 125) at the points of cells, over that of the first region."""
-    density = regions.density / regions.density[0]
-    of_part = None if shared is None else density[shared.region]
-    return np.asarray(point_values(cells, region, shared, density[region], of_part)[0].sum(axis=1))
+def point_shares(cells: FiniteCells, region: RegionOf, shared: SharedCells | None) -> Array:
+    """Weights (c, s, 125) of the points by region, see `point_values`."""
+    of_part = None if shared is None else np.ones(len(shared.region))
+    return point_values(cells, region, shared, np.ones(len(region)), of_part)[0]
 
 
 def _slots(
