@@ -10,13 +10,16 @@ import numpy as np
 from carillon.arrays import Array, Flags, Index, Surface
 from carillon.composition.domains import ClosedSurface, Domain
 from carillon.errors import UserError
+from carillon.fem.embedding import embedding
+from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import Solid
 from carillon.fem.supports import Supports
 
 HELD = 1e3
 """Stiffness of the spring at a held point, in multiples of modulus times lattice spacing. What is
-held moves by a thousandth of what one spacing of the solid is strained; stiffer ones, on cells of
-which little is inside, cost digits."""
+held moves by a thousandth of what one spacing of the solid is strained."""
+LEAST = 1e-6
+"""Least share of a cell inside the solid by which springs there are softer."""
 SAMPLE = 0.5
 """Largest edge of the triangles whose middles stand for a surface, in lattice spacings."""
 SLIGHT = 1e-6
@@ -77,6 +80,8 @@ class _Samples:
     normals: Array
     areas: Array
     """(s, 3), (s, 3), (s,) [m^2]."""
+    corners: Array
+    """(v, 3) [m] corners of the triangles that the points are the middles of."""
     size: float
     """Longest side of the surface [m]."""
 
@@ -93,7 +98,8 @@ class _Samples:
         kept = length > 0.0
         normals = across[kept] / length[kept, None]
         size = float(np.ptp(np.asarray(surface.bounds), axis=0).max())
-        return cls(corners[kept].mean(axis=1), normals, 0.5 * length[kept], size)
+        middles, areas = corners[kept].mean(axis=1), 0.5 * length[kept]
+        return cls(middles, normals, areas, np.asarray(vertices), size)
 
     def inside(self, domain: Domain) -> Index:
         """Numbers of those in a domain, or at its border."""
@@ -127,10 +133,11 @@ def _placed(
     nodes = nodes[part.domain.contains(nodes)]
     # Held beyond the surface and on it, a face would be kept from turning, too.
     nodes = nodes[_is_in_solid(nodes, surface, samples.size)]
-    points = np.concatenate([nodes, samples.points[own]])
+    corners = samples.corners[part.domain.contains(samples.corners)]
+    points = np.concatenate([nodes, samples.points[own], corners])
     if not len(points):
         raise _misses(part, samples, name)
-    springs = np.repeat(_stiff(solid) * along[None], len(points), axis=0)
+    springs = _stiff(solid, points)[:, None, None] * along
     return Supports(points, springs, np.zeros(len(points)))
 
 
@@ -161,7 +168,7 @@ def _at_point(part: Support, solid: Solid, surface: Surface, name: str) -> Suppo
     if part.mass:
         springs = np.zeros((3, 3))
     elif part.spring is None:
-        springs = _stiff(solid) * along
+        springs = _stiff(solid, point[None])[0] * along
     else:
         springs = along @ (np.asarray(part.spring) * np.eye(3)) @ along
     return Supports(point[None], springs[None], np.array([part.mass]))
@@ -182,9 +189,18 @@ def _in_solid(part: Support, point: Array, solid: Solid, surface: Surface, name:
     return np.asarray(place)
 
 
-def _stiff(solid: Solid) -> float:
-    """Stiffness [N/m] of a spring that holds a point."""
-    return HELD * float(np.max(solid.young)) * solid.mesh.edge
+def _stiff(solid: Solid, points: Array) -> Array:
+    """Stiffness (p,) [N/m] of springs that hold points (p, 3) [m].
+
+    In cells of which little is inside they are as much softer, as these are themselves: beside far
+    stiffer springs they would lose their digits.
+    """
+    whole = HELD * float(np.max(solid.young)) * solid.mesh.edge
+    share = np.ones(len(points))
+    if isinstance(solid, FiniteCellModel):
+        own, _ = embedding(solid.with_supports(None), points)
+        share = np.maximum(solid.cells.fractions[own].mean(axis=1), LEAST)
+    return whole * share
 
 
 def _misses(part: Support, samples: _Samples, name: str) -> UserError:

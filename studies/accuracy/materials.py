@@ -62,7 +62,7 @@ class MaterialStudyOptions:
 
 
 @dataclass(frozen=True)
-class Case:
+class MaterialCase:
     """A box with regions and supports, and its frequencies by a theory."""
 
     name: str
@@ -84,7 +84,7 @@ def measure_materials(options: MaterialStudyOptions) -> dict[str, Any]:
     return {"cases": [_measured(case, options.spacings) for case in cases()]}
 
 
-def _measured(case: Case, spacings: tuple[int, ...]) -> dict[str, Any]:
+def _measured(case: MaterialCase, spacings: tuple[int, ...]) -> dict[str, Any]:
     exact = case.exact()
     found: dict[str, Any] = {"name": case.name, "reference": case.reference, "ways": {}}
     for way in WAYS:
@@ -96,7 +96,7 @@ def _measured(case: Case, spacings: tuple[int, ...]) -> dict[str, Any]:
     return found
 
 
-def _error(case: Case, way: str, spacing: int, exact: Array) -> dict[str, Any]:
+def _error(case: MaterialCase, way: str, spacing: int, exact: Array) -> dict[str, Any]:
     model = discretised(case, way, spacing)
     modes = modal_analysis(model, SolverOptions(modes=case.searched, tolerance=TOLERANCE))
     hertz = np.sqrt(np.maximum(modes.values[modes.rigid :], 0.0)) / (2.0 * np.pi)
@@ -109,7 +109,7 @@ def _error(case: Case, way: str, spacing: int, exact: Array) -> dict[str, Any]:
     }
 
 
-def discretised(case: Case, way: str, spacing: int) -> Solid:
+def discretised(case: MaterialCase, way: str, spacing: int) -> Solid:
     """The solid with this many lattice spacings along its second side; slender ones have half."""
     surface = box(extents=case.sides)
     slenderness = max(case.sides) / case.sides[1]
@@ -130,7 +130,7 @@ def discretised(case: Case, way: str, spacing: int) -> Solid:
     return solid.with_supports(placed_supports(case.supports, solid, surface, case.name))
 
 
-def cases() -> list[Case]:
+def cases() -> list[MaterialCase]:
     """All cases."""
     length, side, cut = 0.2, 0.02, 0.0137
     first, second = RIGID_ACROSS
@@ -143,7 +143,7 @@ def cases() -> list[Case]:
     end = Support("end", Expression(f"x < {-length / 2 + 1e-9}"))
     bar = (length, side, side)
     return [
-        Case(
+        MaterialCase(
             "rod of two materials, free",
             "transcendental equation",
             bar,
@@ -152,7 +152,7 @@ def cases() -> list[Case]:
             lambda: rod_frequencies(halves[0], halves[1], 3),
             9,
         ),
-        Case(
+        MaterialCase(
             "rod of two materials, held at an end",
             "transcendental equation",
             bar,
@@ -161,7 +161,7 @@ def cases() -> list[Case]:
             lambda: rod_frequencies(halves[0], halves[1], 3, clamped=True),
             8,
         ),
-        Case(
+        MaterialCase(
             "slender bar of two materials, bending",
             "Euler-Bernoulli, transfer matrices",
             (length, side / 4, side / 4),
@@ -176,7 +176,7 @@ def cases() -> list[Case]:
             ),
             12,
         ),
-        Case(
+        MaterialCase(
             "slender cantilever",
             "Euler-Bernoulli",
             (length, side / 4, side / 4),
@@ -185,7 +185,7 @@ def cases() -> list[Case]:
             lambda: bending_frequencies([_beam(first, length, side / 4, side / 4)], 2, True),
             8,
         ),
-        Case(
+        MaterialCase(
             "thick cantilever",
             "Timoshenko",
             (length / 2, side, side),
@@ -194,7 +194,7 @@ def cases() -> list[Case]:
             lambda: timoshenko_cantilever(_beam(first, length / 2, side, side), 3),
             10,
         ),
-        Case(
+        MaterialCase(
             "bar of two layers, bending",
             "Euler-Bernoulli of the layers",
             (length, side / 4, side / 4),
@@ -216,7 +216,7 @@ def cases() -> list[Case]:
     ]
 
 
-def _boxes() -> list[Case]:
+def _boxes() -> list[MaterialCase]:
     sides, border = (0.06, 0.05, 0.04), 0.0047
     askew = axes_along(np.array([1.0, 0.4, 0.2]), np.array([0.0, 1.0, 0.3]))
     wood = float(SPRUCE.young[0]) * rotated(SPRUCE.elasticity[0], askew)
@@ -239,9 +239,13 @@ def _boxes() -> list[Case]:
     spruce = (SPRUCE, Everywhere(), askew)
     both = spruce, (STEEL, Expression(f"z > {border}"))
     return [
-        Case("block of spruce, askew", "Rayleigh-Ritz", sides, (spruce,), (), ritz(whole), 26),
-        Case("spruce and steel", "Rayleigh-Ritz in layers", sides, both, (), ritz(layers), 26),
-        Case(
+        MaterialCase(
+            "block of spruce, askew", "Rayleigh-Ritz", sides, (spruce,), (), ritz(whole), 26
+        ),
+        MaterialCase(
+            "spruce and steel", "Rayleigh-Ritz in layers", sides, both, (), ritz(layers), 26
+        ),
+        MaterialCase(
             "spruce and steel, held at its base",
             "Rayleigh-Ritz in layers",
             sides,
