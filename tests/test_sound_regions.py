@@ -47,10 +47,13 @@ def parts_of(material):
     ]
 
 
-def simulation(kind, material="brass", supports=(), free=NOTHING, level=False, tolerance=1e-13):
-    """A block of two regions whose border is oblique."""
+def simulation(
+    kind, material="brass", supports=(), free=NOTHING, level=False, tolerance=1e-13, more=()
+):
+    """A block of two regions whose border is oblique, or of more."""
     surface = surface_of_block()
-    composition = Composition(parts_of(material), "block", ClosedSurface(surface))
+    parts = [*parts_of(material), *more]
+    composition = Composition(parts, "block", ClosedSurface(surface))
     cells = None
     if kind == "finite-cell":
         cells = finite_cells(surface, 6)
@@ -76,8 +79,11 @@ def simulation(kind, material="brass", supports=(), free=NOTHING, level=False, t
 
 
 def solid_at(solid, z):
+    """The solid of coordinates z, whose kinks follow its nodes as the materials in tables say."""
     model = solid.elements.with_young(solid.material.moduli(z))
-    return model.with_regions(solid.regions(z))
+    made = model.with_regions(solid.regions(z))
+    made.__dict__["elements"] = model.elements.with_regions(made.regions)
+    return made
 
 
 def exact(solid, z):
@@ -133,18 +139,28 @@ def free(density=True, poisson=True):
 
 
 CLAMP = Support("clamp", Expression("x < 0.001"))
-HINGE = Support("hinge", Expression("x < 0.0001 and z < 0.0001"))
+HINGE = (Support("one", None, (0.0, 0.0, 0.0)), Support("other", None, (0.0, 0.06, 0.0)))
 MASS = Support("mass", None, (0.07, 0.03, 0.04), mass=0.2)
 SPRING = Support("spring", None, (0.01, 0.03, 0.0), spring=np.array(3e7))
 
 
-@pytest.mark.parametrize("supports", [(), (CLAMP,), (HINGE,)])
+@pytest.mark.parametrize("supports", [(), (CLAMP,), HINGE])
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_two_regions(kind, supports):
     solid = simulation(kind, supports=supports, free=free())
-    assert solid.model.rigid_modes == {(): 6, (CLAMP,): 0, (HINGE,): 1}[supports]
+    assert solid.model.rigid_modes == {(): 6, (CLAMP,): 0, HINGE: 1}[supports]
     z = 0.3 * np.random.default_rng(1).standard_normal(solid.material.dimensions)
     assert_derivatives(solid, z, kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shares_of_three_regions_that_meet_add_up(kind):
+    """Some finite cells hold all three."""
+    glass = named_material("glass").region("third")
+    solid = simulation(kind, more=[MaterialRegion(glass, Expression("z > 0.0217"))])
+    evaluation = solid.evaluate(0.3 * np.random.default_rng(7).standard_normal(SIZE))
+    whole = np.zeros(len(solid.material.basis), dtype=int)
+    np.testing.assert_allclose(solid.energy_shares(evaluation, whole), 1.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["voxel", "finite-cell"])
@@ -164,7 +180,7 @@ def test_derivatives_of_a_solid_with_springs_and_masses(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_all_pairs_are_the_same_ones(kind):
     """Those of the reduced model, whose modes may mix."""
-    solid = simulation(kind, supports=(HINGE,), free=free(), tolerance=1e-11)
+    solid = simulation(kind, supports=HINGE, free=free(), tolerance=1e-11)
     z = 0.3 * np.random.default_rng(4).standard_normal(solid.material.dimensions)
     evaluation = solid.evaluate(z)
     few, all_ = (solid.differentiate(evaluation, whole) for whole in (False, True))
@@ -195,37 +211,43 @@ def test_one_material_in_two_regions_has_the_derivatives_of_one(kind):
 def test_decays_are_those_of_the_quadratic_eigenproblem(kind):
     """(K + s C + s^2 M) u = 0 with the damping of two regions, to first order."""
     solid = simulation(kind, supports=(CLAMP,))
-    z = np.zeros(SIZE)
+    model = solid_at(solid, np.zeros(SIZE))
     pairs = ((12.0, 3e-8), (70.0, 4e-7))
-    model = solid_at(solid, z)
-    regions = replace(model.regions, damping=pairs)
-    model = model.with_regions(regions)
-    evaluation = solid.evaluate(z)
+    evaluation = solid.evaluate(np.zeros(SIZE))
     elastic = solid.mesh_rows(evaluation.modes.elastic)
-    lost = dissipation(model, evaluation.eigenvalues, elastic)
+    damped = model.with_regions(replace(model.regions, damping=pairs))
+    lost = dissipation(damped, evaluation.eigenvalues, elastic)
     found = lost.decay_per_second(evaluation.eigenvalues)
 
     K, M = (matrix.toarray() for matrix in assembled(model))
-    alpha, beta = np.zeros_like(K), np.zeros_like(K)
-    for row, (by_mass, by_stiffness) in enumerate(pairs):
-        doubled = regions.density * np.where(np.arange(2) == row, 2.0, 1.0)
-        heavier = assembled(model.with_regions(replace(regions, density=doubled)))[1]
-        alpha += by_mass * (heavier.toarray() - M)
-        laws = tuple(
-            type(law)(tuple(np.array(law.entries) * (2.0 if number == row else 1.0)))
-            for number, law in enumerate(regions.laws)
-        )
-        stiffer = assembled(model.with_regions(replace(regions, laws=laws)))[0]
-        beta += by_stiffness * (stiffer.toarray() - K)
     # In the space of many modes, where the stiff springs are no matter.
     values, modes = la.eigh(K, M, subset_by_index=(0, 120))
-    C = modes.T @ (alpha + beta) @ modes
+    free, C = model.with_supports(None), np.zeros((len(values),) * 2)
+    for row, (by_mass, by_stiffness) in enumerate(pairs):
+        own = np.arange(2) == row
+        doubled = replace(free.regions, density=free.regions.density * np.where(own, 2.0, 1.0))
+        more = between(free.with_regions(doubled).nodal_mass() - free.nodal_mass(), free, modes)
+        elements = free.elements
+        law = elements.region if kind == "voxel" else elements.law[:, :, None]
+        part = elements.with_young(np.where(own[law], elements.young, 0.0))
+        C += by_mass * more + by_stiffness * between(part.stiffness(), free, modes)
     size = len(values)
     companion = np.block([[np.zeros((size, size)), np.eye(size)], [-np.diag(values), -C]])
     roots = la.eigvals(companion)
     roots = roots[roots.imag > 0.0]
     roots = roots[np.argsort(np.abs(roots))][:MODES]
     np.testing.assert_allclose(found, -roots.real, rtol=1e-3)
+
+
+def between(matrices, model, modes):
+    """Products (k, k) of modes with the sum of element matrices, of each axis if they are nodal."""
+    count, width = model.connectivity.shape
+    local = modes.reshape(-1, 3, modes.shape[1])[model.connectivity]
+    if matrices.shape[1] == width:
+        matrices = np.einsum("cab,ij->caibj", matrices, np.eye(3))
+        matrices = matrices.reshape(count, 3 * width, 3 * width)
+    local = local.reshape(count, 3 * width, -1)
+    return np.einsum("cak,cab,cbl->kl", local, matrices, local, optimize=True)
 
 
 @pytest.mark.parametrize("kind", KINDS)
