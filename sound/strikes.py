@@ -1,6 +1,6 @@
 """The struck surface, that of a mesh refined to have a vertex near every point, and its points."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -23,6 +23,8 @@ OTHER_UNITS = (1e-3, 1e3, 1e-2, 1e2, 0.0254, 1.0 / 0.0254)
 """Factors between units that people mix up."""
 NEAR_IN_OTHER_UNIT = 0.02
 """Distance from the surface, over the longest side, that shows a point to be in another unit."""
+BORDER_EDGE = 1.0 / 100.0
+"""The same of an edge between parts of different materials."""
 SAME_PLACE = 1e-6
 """Distance, over the longest side, within which two vertices are at one place."""
 LONGEST_EDGE = 1.0 / 16.0
@@ -157,8 +159,13 @@ def _shown(point: Array, unit: float) -> str:
     return f"({numbers}) {'m' if unit == 1.0 else 'mesh units'}"
 
 
-def struck_surface(mesh: str, unit: float = 1.0) -> Surface:
+def struck_surface(
+    mesh: str, unit: float = 1.0, parts_of: Callable[[Array, Index], Index] | None = None
+) -> Surface:
     """Surface of a mesh in metres, without edges above `LONGEST_EDGE` of its longest side.
+
+    Where numbers (V,) change that `parts_of` gives to its vertices and triangles, `BORDER_EDGE`
+    counts.
 
     The mesh's own vertices come first and keep their numbers; `carillon.fem.geometry.load_surface`
     describes it and its unit.  Raises UserError if there is no such mesh.
@@ -168,9 +175,12 @@ def struck_surface(mesh: str, unit: float = 1.0) -> Surface:
     from carillon.fem.geometry import load_surface
 
     surface = load_surface(mesh, unit)
-    longest = LONGEST_EDGE * longest_side(surface)
+    side = longest_side(surface)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
-    return trimesh.Trimesh(*_cut(vertices, faces, longest), process=False)
+    cut = _cut(vertices, faces, LONGEST_EDGE * side)
+    if parts_of is not None:
+        cut = _cut(*cut, BORDER_EDGE * side, parts_of)
+    return trimesh.Trimesh(*cut, process=False)
 
 
 def longest_side(surface: Surface) -> float:
@@ -178,14 +188,28 @@ def longest_side(surface: Surface) -> float:
     return float(np.max(surface.extents))
 
 
-def _cut(vertices: Array, faces: Index, longest: float) -> tuple[Array, Index]:
-    """Halve edges longer than `longest` in all triangles that share them, until there are none."""
+def _cut(
+    vertices: Array,
+    faces: Index,
+    longest: float,
+    parts_of: Callable[[Array, Index], Index] | None = None,
+) -> tuple[Array, Index]:
+    """Halve edges longer than `longest` in all triangles that share them, until there are none.
+
+    Those of triangles of one part stay.
+    """
     while True:
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
         sides = np.sort(ends.reshape(-1, 2), axis=1)
         edges, of_sides = np.unique(sides, axis=0, return_inverse=True)
         first, second = vertices[edges[:, 0]], vertices[edges[:, 1]]
         long = np.linalg.norm(second - first, axis=1) > longest
+        if parts_of is not None:
+            part = parts_of(vertices, faces)[faces]
+            mixed = (part != part[:, :1]).any(axis=1)
+            of_mixed = np.zeros(len(edges), dtype=bool)
+            of_mixed[of_sides.reshape(-1, 3)[mixed]] = True
+            long &= of_mixed
         if not long.any():
             return vertices, faces
         middles = np.full(len(edges), -1)

@@ -108,12 +108,12 @@ def test_voxels_are_as_they_were_and_told_how_far_off_they_are(count):
 
 
 def test_the_modes_are_found_where_the_distance_cannot_be_told(monkeypatch, capsys):
-    import sound.scenes.uniform as uniform
+    import sound.scenes.solved as solved
 
     def fails(*_):
         raise FloatingPointError("a fault")
 
-    monkeypatch.setattr(uniform, "estimate_cell_errors", fails)
+    monkeypatch.setattr(solved, "estimate_cell_errors", fails)
     found = body(mesh="builtin:bar", material="glass", count=2, resolution=9, collision="hull")
     assert len(found.solid.frequencies) == 2
     assert found.accuracy == {"discretisation": "finite-cell", "resolution": 9}

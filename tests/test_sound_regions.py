@@ -12,6 +12,7 @@ from carillon.composition.composition import Composition, MaterialRegion
 from carillon.composition.domains import ClosedSurface, Everywhere, Expression
 from carillon.composition.materials import named_material
 from carillon.composition.supports import Support, placed_supports
+from carillon.fem.block import degrees_of_freedom
 from carillon.fem.energies import energy_shares
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.finite_cells.model import finite_cell_model
@@ -220,6 +221,19 @@ def test_decays_are_those_of_the_quadratic_eigenproblem(kind):
     found = lost.decay_per_second(evaluation.eigenvalues)
 
     K, M = (matrix.toarray() for matrix in assembled(model))
+<<<<<<< HEAD
+=======
+    alpha, beta = np.zeros_like(K), np.zeros_like(K)
+    for row, (by_mass, by_stiffness) in enumerate(pairs):
+        doubled = regions.density * np.where(np.arange(2) == row, 2.0, 1.0)
+        heavier = assembled(model.with_regions(replace(regions, density=doubled)))[1]
+        alpha += by_mass * (heavier.toarray() - M)
+        elements = model.with_supports(None).elements
+        own = elements.with_young(elements.moduli_of(np.arange(2) == row)).stiffness()
+        dofs = degrees_of_freedom(model.connectivity.astype(np.int64))
+        for places, matrix in zip(dofs, own, strict=True):
+            beta[np.ix_(places, places)] += by_stiffness * matrix
+>>>>>>> main
     # In the space of many modes, where the stiff springs are no matter.
     values, modes = la.eigh(K, M, subset_by_index=(0, 120))
     free, C = model.with_supports(None), np.zeros((len(values),) * 2)

@@ -106,6 +106,8 @@ def check_files(
     with _mistakes_in_lines(files, given):
         for name in config["models"]:
             _check_files_of(config, name)
+        for name in config["times"]["models"]:
+            _check_plain(config, name)
         forests = forests_file(config)
         if forests is not None and not Path(forests).is_file():
             raise ParameterError(
@@ -124,13 +126,31 @@ def _check_files_of(config: Mapping[str, Any], name: str) -> None:
     for key, path in _files_by_key(config, name).items():
         if Path(path).is_file():
             continue
-        meant = alike(model[key], known[key])
+        meant = alike(model[key], known.get(key, {}))
         hint = f" (did you mean {known[key][meant]}?)" if meant else ""
-        others = {"mesh": "a file or builtin:NAME", "material": f"a file or {', '.join(MATERIALS)}"}
+        others = {
+            "mesh": "a file or builtin:NAME",
+            "material": f"a file or {', '.join(MATERIALS)}",
+            "regions": "a file",
+        }
         raise ParameterError(
             ("models", name, key),
             f"found {model[key]!r}, expected {others[key]}{hint}; there is no file {path}; put it "
             "there, or set mesh_folder to the folder that holds it",
+        )
+    for path in _files_of_regions(config, name):
+        if not Path(path).is_file():
+            raise ParameterError(
+                ("models", name, "regions"), f"a region is from {path}, which is no file"
+            )
+
+
+def _check_plain(config: Mapping[str, Any], name: str) -> None:
+    if config["models"][name]["fix"] or described_by(config, name):
+        raise ParameterError(
+            ("times", "models"),
+            f"{name} is of several regions, or held; methods are timed on free solids of one "
+            "Poisson's ratio, so leave it out",
         )
 
 
@@ -151,13 +171,37 @@ def material_of(config: Mapping[str, Any], model: str) -> str:
 
 def model_files(config: Mapping[str, Any], model: str) -> list[str]:
     """Files that a model is made from; none for a built-in object with a named material."""
-    return list(_files_by_key(config, model).values())
+    return [*_files_by_key(config, model).values(), *_files_of_regions(config, model)]
+
+
+def regions_of(config: Mapping[str, Any], model: str) -> str | None:
+    """File of a model's regions and of what holds it; None if it is of one material, and free."""
+    named = config["models"][model]["regions"]
+    return None if named is None else _in_mesh_folder(config, named)
+
+
+def described_by(config: Mapping[str, Any], model: str) -> str | None:
+    """File that tells a model's regions: that of the regions, or a mesh that is made of some."""
+    mesh = mesh_of(config, model)
+    return regions_of(config, model) or (mesh if Path(mesh).suffix in (".yaml", ".yml") else None)
+
+
+def _files_of_regions(config: Mapping[str, Any], model: str) -> list[str]:
+    """Files that the file of a model's regions names."""
+    file = described_by(config, model)
+    if file is None or not Path(file).is_file():
+        return []
+    from workflow.composition import files_of  # Its import takes long.
+
+    return files_of(file)
 
 
 def _files_by_key(config: Mapping[str, Any], model: str) -> dict[str, str]:
     mesh, material = mesh_of(config, model), material_of(config, model)
     files = {} if mesh.startswith(BUILTIN_PREFIX) else {"mesh": mesh}
-    return files if material in MATERIALS else {**files, "material": material}
+    files |= {} if material in MATERIALS else {"material": material}
+    regions = regions_of(config, model)
+    return files if regions is None else {**files, "regions": regions}
 
 
 def forests_file(config: Mapping[str, Any]) -> str | None:

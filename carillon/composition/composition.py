@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from carillon.composition.domains import ClosedSurface, Domain, Placement
+from carillon.composition.domains import ClosedSurface, Domain, Everywhere, Placement
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells, centroids
 from carillon.fem.finite_cells.kinks import Borders
@@ -65,19 +65,43 @@ class Composition:
         Of the solid, for messages.
     surface
         Inside of the solid, by which finite cells are divided.
+    rest
+        Whether the first part is what the others leave, which may be nothing.
     """
 
-    def __init__(self, parts: Sequence[MaterialRegion], name: str, surface: ClosedSurface) -> None:
+    def __init__(
+        self,
+        parts: Sequence[MaterialRegion],
+        name: str,
+        surface: ClosedSurface,
+        rest: bool = False,
+    ) -> None:
         if not parts:
             raise UserError(f"{name}: no region; expected at least one")
         self._parts, self._name, self._surface = tuple(parts), name, surface
+        self._rest = rest
         self._placement = Placement([part.place for part in parts])
         self.regions = Regions.together([_turned(part) for part in parts])
         """A row for each region, those aside whose axes vary."""
 
     @property
     def _is_one(self) -> bool:
-        return len(self._parts) == 1 and not callable(self._parts[0].axes)
+        first = self._parts[0]
+        alike = isinstance(first.place, Everywhere) and not callable(first.axes)
+        return len(self._parts) == 1 and alike
+
+    def parts_at(self, points: Array) -> Index:
+        """Number (p,) of the part that each of some points (p, 3) [m] of the solid is of.
+
+        One that is of none has that of the nearest one.
+        """
+        found = self._placement.at(points).astype(np.int64)
+        lost, there = np.flatnonzero(found < 0), np.flatnonzero(found >= 0)
+        if len(lost) and len(there):
+            from scipy.spatial import cKDTree  # Its import takes long.
+
+            found[lost] = found[there[cKDTree(points[there]).query(points[lost])[1]]]
+        return np.maximum(found, 0)
 
     def of_voxels(self, mesh: HexMesh) -> PlacedRegions:
         """Regions of the voxels of a mesh: those at their middles.
@@ -178,7 +202,9 @@ class Composition:
 
     def _require_all(self, found: NDArray[np.integer]) -> None:
         missing = [
-            part.name for index, part in enumerate(self._parts) if not (found == index).any()
+            part.name
+            for index, part in enumerate(self._parts)
+            if not (found == index).any() and not (self._rest and index == 0)
         ]
         if missing:
             raise UserError(

@@ -333,19 +333,26 @@ def read_composition(path: str | Path) -> CompositionEntry:
     return read_parameters(path, CompositionEntry, "regions and supports of a solid")
 
 
-def compose(entry: CompositionEntry, solid: SolidFrame, fixed: Sequence[str] = ()) -> Placed:
+def compose(
+    entry: CompositionEntry,
+    solid: SolidFrame,
+    fixed: Sequence[str] = (),
+    rest: Regions | None = None,
+) -> Placed:
     """Regions and supports of a solid.
 
-    Further places are `fixed`, held there, see `SupportEntry.where`. Raises UserError for files,
-    materials and places that are of no use.
+    Further places are `fixed`, held there, see `SupportEntry.where`; `rest` is the row of what is
+    of no region, without which there must be nothing such. Raises UserError for files, materials
+    and places that are of no use.
     """
     domains = {each.name: each.domain(solid) for each in entry.regions}
     composition = None
-    if entry.regions:
-        parts = [
-            MaterialRegion(each.row(), domains[each.name], each.axes()) for each in entry.regions
-        ]
-        composition = Composition(parts, solid.name, ClosedSurface(solid.surface))
+    parts = [MaterialRegion(each.row(), domains[each.name], each.axes()) for each in entry.regions]
+    if rest is not None:
+        parts.insert(0, MaterialRegion(rest, Everywhere()))
+    if parts:
+        inside = ClosedSurface(solid.surface)
+        composition = Composition(parts, solid.name, inside, rest is not None)
     entries = [*entry.supports, *(SupportEntry(where=where) for where in fixed)]
     return Placed(composition, tuple(each.support(domains) for each in entries))
 

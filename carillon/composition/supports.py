@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.arrays import Array, Index, Surface
+from carillon.arrays import Array, Flags, Index, Surface
 from carillon.composition.domains import ClosedSurface, Domain
 from carillon.errors import UserError
 from carillon.fem.model import Solid
@@ -126,12 +126,32 @@ def _placed(
     nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
     nodes = nodes[part.domain.contains(nodes)]
     # Held beyond the surface and on it, a face would be kept from turning, too.
-    nodes = nodes[ClosedSurface(surface).contains(nodes)]
+    nodes = nodes[_is_in_solid(nodes, surface, samples.size)]
     points = np.concatenate([nodes, samples.points[own]])
     if not len(points):
         raise _misses(part, samples, name)
     springs = np.repeat(_stiff(solid) * along[None], len(points), axis=0)
     return Supports(points, springs, np.zeros(len(points)))
+
+
+def _is_in_solid(points: Array, surface: Surface, size: float) -> Flags:
+    """Which points (p, 3) [m] are in the solid, or on its surface."""
+    inside = ClosedSurface(surface).contains(points)
+    others = np.flatnonzero(~inside)
+    if len(others):
+        distance, _ = _nearest(points[others], surface)
+        inside[others] = distance <= SLIGHT * size
+    return inside
+
+
+def _nearest(points: Array, surface: Surface) -> tuple[Array, Array]:
+    """Distances (p,) [m] from a surface, and its nearest points (p, 3)."""
+    import igl
+
+    faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
+    vertices = np.ascontiguousarray(surface.vertices)
+    found = igl.point_mesh_squared_distance(np.ascontiguousarray(points), vertices, faces)
+    return np.sqrt(np.ravel(found[0])), np.reshape(found[2], (-1, 3))
 
 
 def _at_point(part: Support, solid: Solid, surface: Surface, name: str) -> Supports:
@@ -151,13 +171,8 @@ def _in_solid(part: Support, point: Array, solid: Solid, surface: Surface, name:
     """A point (3,) [m] if it is in the solid, or the nearest one of the surface."""
     if ClosedSurface(surface).contains(point[None])[0]:
         return point
-    import igl
-
-    faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
-    square, _, nearest = igl.point_mesh_squared_distance(
-        point[None], np.ascontiguousarray(surface.vertices), faces
-    )[:3]
-    distance, place = float(np.sqrt(np.ravel(square)[0])), np.reshape(nearest, 3)
+    distances, places = _nearest(point[None], surface)
+    distance, place = float(distances[0]), places[0]
     if distance > REACH * solid.mesh.edge:
         shown, other = (", ".join(f"{value:.4g}" for value in each) for each in (point, place))
         raise UserError(

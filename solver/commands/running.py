@@ -22,10 +22,12 @@ from solver.linear import petsc_options
 Options = TypeVar("Options")
 """Options of a command."""
 
-INPUTS = ("mesh", "material", "forest", "truth", "initial_modes", "files", "candidates")
+INPUTS = ("mesh", "material", "regions", "forest", "truth", "initial_modes", "files", "candidates")
 """Arguments that name input files of a command."""
 HIDDEN = ("out", "pictures", "json", "phases")
 """Arguments that do not change a result."""
+COMPOSED = ("regions", "fix")
+"""Those of solids of several materials or held ones, for commands on free solids of one."""
 
 
 @contextmanager

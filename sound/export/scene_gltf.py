@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from carillon import __version__
-from carillon.arrays import Array
+from carillon.arrays import Array, Integers
 from sound.export.gltf import (
     FLOAT,
     TRIANGLES,
@@ -77,8 +77,7 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
         "scene": 0,
         "scenes": [{"name": performance.title, "nodes": [0], "extensions": emitter}],
         "nodes": [root, *nodes],
-        "meshes": [_mesh(each, number, buffer) for number, each in enumerate(seen)],
-        "materials": [_material(each) for each in seen],
+        **_surfaces(seen, buffer),
         "cameras": [{"type": "perspective", "perspective": perspective}],
         "animations": [{"name": "motion", "channels": channels, "samplers": samplers}],
         **buffer.entries(),
@@ -125,18 +124,40 @@ def _turns(motion: Motion) -> Array:
     return turns
 
 
-def _mesh(each: Appearance, material: int, buffer: Buffer) -> dict[str, Any]:
-    positions = buffer.add(each.vertices, FLOAT, VERTICES)
-    indices = buffer.add(each.faces.ravel(), UNSIGNED_INT, TRIANGLES)
-    surface = {"attributes": {"POSITION": positions}, "indices": indices, "material": material}
-    return {"name": each.name, "primitives": [surface]}
+def _surfaces(seen: list[Appearance], buffer: Buffer) -> dict[str, Any]:
+    """Meshes and materials: a part of a mesh for each colour."""
+    meshes: list[dict[str, Any]] = []
+    materials: list[dict[str, Any]] = []
+    for each in seen:
+        positions = buffer.add(each.vertices, FLOAT, VERTICES)
+        primitives = []
+        for faces, colour in _painted(each):
+            indices = buffer.add(faces.ravel(), UNSIGNED_INT, TRIANGLES)
+            primitives.append(
+                {
+                    "attributes": {"POSITION": positions},
+                    "indices": indices,
+                    "material": len(materials),
+                }
+            )
+            materials.append(_material(each.name, colour))
+        meshes.append({"name": each.name, "primitives": primitives})
+    return {"meshes": meshes, "materials": materials}
 
 
-def _material(each: Appearance) -> dict[str, Any]:
+def _painted(each: Appearance) -> list[tuple[Integers, tuple[float, float, float]]]:
+    """Triangles (f, 3) of each colour."""
+    if each.painted is None:
+        return [(each.faces, each.colour)]
+    parts = [(each.faces[each.painted == k], colour) for k, colour in enumerate(each.colours)]
+    return [part for part in parts if len(part[0])]
+
+
+def _material(name: str, colour: tuple[float, float, float]) -> dict[str, Any]:
     return {
-        "name": each.name,
+        "name": name,
         "pbrMetallicRoughness": {
-            "baseColorFactor": [*linear_light(each.colour).tolist(), 1.0],
+            "baseColorFactor": [*linear_light(colour).tolist(), 1.0],
             "metallicFactor": 0.0,
             "roughnessFactor": ROUGHNESS,
         },

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Integers
+from carillon.composition.materials import NamedMaterial
 from carillon.errors import ConvergenceError, UserError
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.convex import convex_parts, hull_of
+from sound.scenes.divided import parts_of_one
 from sound.scenes.hertz import compliance
 from sound.scenes.object_solid import ObjectSolid, object_solid
 from sound.scenes.scene import ObjectEntry
@@ -116,9 +118,16 @@ class Body:
     compliance: Array
     """(V,) [1/Pa]: compliance of the material at the surface's vertices, see
     `sound.scenes.hertz.compliance`."""
+    materials: tuple[NamedMaterial, ...]
+    which: Integers
+    """What the surface is of, and number (V,) of that at each vertex."""
     parts: list[Array]
     """list of (n, 3) [m]: corners of the convex parts that collide, in the body's own axes; none
     for a ball."""
+    of_parts: tuple[int, ...]
+    """Number of the material of each part."""
+    volume: float
+    """float [m^3]: volume of the material."""
     solid: SoundingSolid | None
     listening: Listening | None
     """Modes, None if the body is silent; loudness and noise of a design's clips, None without."""
@@ -128,14 +137,8 @@ class Body:
     """(3, 3) or None: rotation from the coordinates of the solid to the body's own axes; None if
     they agree."""
     accuracy: dict[str, Any] | None
-    """dict or None: expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`, if
+    """dict or None: expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`, if
     known."""
-
-    @property
-    def volume(self) -> float:
-        """Volume of the material [m^3]."""
-        silent = self.entry.made_of.density
-        return self.mass / (silent if self.solid is None else self.solid.model.density)
 
     def motion(self, places: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] in each mode at places (p, 3) [m], in own axes."""
@@ -186,7 +189,10 @@ def body_of(entry: ObjectEntry) -> Body:
     ConvergenceError if the modes were not found; both name the object.
     """
     try:
-        body = _upright_body(entry, object_solid(entry))
+        solid = object_solid(entry)
+        if solid.is_held and not entry.fixed:
+            raise UserError("is held, so it cannot move; add fixed: true")
+        body = _upright_body(entry, solid)
     except UserError as error:
         raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
     except ConvergenceError as error:
@@ -217,6 +223,12 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         parts = [hull_of(shape.vertices)]
     else:
         parts = convex_parts(shape.vertices, shape.faces)
+    which = np.zeros(len(shape.vertices), dtype=np.int64)
+    of_parts = [0] * max(1, len(parts))
+    if solid.which is not None:
+        which = np.asarray(solid.which)
+        parts, of_parts = parts_of_one(parts, shape.vertices, which)
+    density = entry.made_of.density if solid.sounding is None else solid.sounding.model.density
     return Body(
         entry,
         rigid.mass,
@@ -224,7 +236,11 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         rigid.centre,
         shape,
         compliance(solid.young, solid.poisson),
+        solid.materials,
+        which,
         parts,
+        tuple(of_parts),
+        rigid.mass / density if solid.volume is None else solid.volume,
         solid.sounding,
         solid.listening,
         solid.radius,

@@ -14,7 +14,7 @@ BOUNCE = 2.8683
 from 0 to 1."""
 
 
-def compliance(young: Array | float, poisson: float) -> Array:
+def compliance(young: Array | float, poisson: Array | float) -> Array:
     """Part of a solid in 1 / E [1/Pa], from its Young's modulus [Pa] and Poisson's ratio."""
     return np.asarray((1.0 - poisson**2) / young)
 

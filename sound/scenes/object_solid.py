@@ -6,20 +6,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Surface
+from carillon.arrays import Array, Integers, Surface
+from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError
 from carillon.fem.geometry.size import doubt_unit
-from carillon.fem.model import MassProperties, Solid, mass_properties
+from carillon.fem.model import RIGID_MODES, MassProperties, Solid, mass_properties
 from carillon.files.hdf5 import kind_of
 from carillon.limits import EXTENTS
-from solver.files.modes_file import read_modes, require_same_solid
+from solver.files.modes_file import ModesFile, read_modes, require_same_solid
 from solver.refinement.errors import FROM_SOLID
 from solver.response.response import Damping
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
+from sound.scenes.composed import ComposedObject, losing
 from sound.scenes.scene import ObjectEntry
-from sound.scenes.uniform import Discretised, UniformSolid, uniform_solid
+from sound.scenes.solved import Discretised
+from sound.scenes.touched import touched_in_file, young_near
+from sound.scenes.uniform import UniformSolid, uniform_solid
 
 BALL_DIVISIONS = 3
 """Number of times that the faces of an icosahedron are divided to make the surface of a ball."""
@@ -40,9 +44,13 @@ class ObjectSolid:
     vertices: Array
     faces: NDArray[np.integer]
     young: Array
-    poisson: float
-    """(V, 3) [m], (F, 3), (V,) [Pa], float: surface, Young's modulus at its vertices, and Poisson's
-    ratio."""
+    poisson: Array | float
+    """(V, 3) [m], (F, 3), (V,) [Pa], (V,) or float: surface, Young's modulus at its vertices, and
+    Poisson's ratio."""
+    materials: tuple[NamedMaterial, ...]
+    which: Integers | None
+    """What it is made of as others touch it, and number (V,) of that at each vertex; None if there
+    is one."""
     sounding: SoundingSolid | None
     mesh: str = ""
     """str: name of the mesh file that the solid was made from, empty if there is none."""
@@ -50,7 +58,11 @@ class ObjectSolid:
     radius: float | None = None
     """float [m] or None: radius of a ball, None for any other solid."""
     accuracy: dict[str, Any] | None = None
-    """dict or None: expected errors of the frequencies, see `sound.scenes.uniform.UniformSolid`."""
+    """dict or None: expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`."""
+    volume: float | None = None
+    """float [m^3] or None: volume of the material; None if the object's density tells it."""
+    is_held: bool = False
+    """bool: whether something holds it in its place."""
 
 
 def object_solid(entry: ObjectEntry) -> ObjectSolid:
@@ -60,31 +72,39 @@ def object_solid(entry: ObjectEntry) -> ObjectSolid:
     ConvergenceError if the modes were not found.
     """
     if entry.design is not None:
-        return _of_design(entry.design)
+        return _of_design(entry, entry.design)
     if entry.modes is not None:
-        return _of_modes(entry.modes, entry.heard_modes, _damping(entry))
+        return _of_modes(entry, entry.modes, entry.heard_modes)
     if entry.radius is not None:
         return _of_ball(entry, entry.radius)
     assert entry.mesh is not None
+    if entry.regions or entry.supports:
+        return _of_parts(entry, entry.mesh)
     return _of_mesh(entry, entry.mesh)
 
 
-def _of_design(path: str) -> ObjectSolid:
+def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
     design = read_design(_of_kind(path, "design"))
     sounding = SoundingSolid.of_design(design)
+    vertices = design.surface_vertices
+    touched = touched_in_file(entry, path, design.model, vertices)
     return ObjectSolid(
         mass_properties(design.model),
-        design.surface_vertices,
+        vertices,
         design.surface_faces,
-        design.young_near(design.surface_vertices),
-        design.model.regions.mean_poisson,
+        touched.share * design.young_near(vertices),
+        touched.poisson,
+        touched.materials,
+        touched.which,
         sounding,
         design.settings.get("mesh", ""),
         Listening.of_design(design, sounding),
+        volume=_volume(design.model),
+        is_held=design.model.rigid_modes < RIGID_MODES,
     )
 
 
-def _of_modes(path: str, heard_path: str | None, damping: Damping) -> ObjectSolid:
+def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSolid:
     """The solid of a modes file, with the modes of another file if one is named."""
     heard = file = read_modes(_of_kind(path, "modes"))
     if heard_path is not None:
@@ -96,16 +116,39 @@ def _of_modes(path: str, heard_path: str | None, damping: Damping) -> ObjectSoli
     if accuracy:
         kept = ("discretisation", "resolution")
         accuracy |= {key: attributes[key] for key in kept if key in attributes}
+    touched = touched_in_file(entry, path, file.model, vertices)
     return ObjectSolid(
         mass_properties(file.model),
         vertices,
         faces,
-        _young_near(file.model, vertices),
-        file.model.regions.mean_poisson,
-        SoundingSolid.of_modes(heard, damping),
+        touched.share * young_near(file.model, vertices),
+        touched.poisson,
+        touched.materials,
+        touched.which,
+        _heard(entry, heard),
         file.attributes.get("mesh", ""),
         accuracy=accuracy or None,
+        volume=_volume(file.model),
+        is_held=file.model.rigid_modes < RIGID_MODES,
     )
+
+
+def _heard(entry: ObjectEntry, file: ModesFile) -> SoundingSolid:
+    """Modes of a file, damped as its regions, where it tells, or as the object says."""
+    regions, own = file.model.regions, entry.made_of
+    told = file.model.region is not None or entry.material is None
+    if entry.damping is not None or not told or not any(regions.damping):
+        return SoundingSolid.of_modes(file, _damping(entry))
+    assert file.modes is not None
+    by_name = {
+        name: damping or (own.alpha, own.beta)
+        for name, damping in zip(regions.names, regions.damping)
+    }
+    return SoundingSolid.damped(losing(file.model, by_name), file.eigenvalues, file.modes)
+
+
+def _volume(model: Solid) -> float | None:
+    return None if model.region is None and model.supports is None else model.mass / model.density
 
 
 def _of_kind(path: str, expected: str) -> str:
@@ -127,18 +170,6 @@ def _voxel_surface(model: Solid) -> tuple[Array, NDArray[np.int64]]:
     return model.mesh.nodes[used], faces.astype(np.int64)
 
 
-def _young_near(model: Solid, vertices: Array) -> Array:
-    """Young's modulus (V,) [Pa] of the cells nearest to vertices (V, 3) [m]."""
-    from scipy.spatial import cKDTree
-
-    cells = model.hexmesh
-    centres = cells.nodes[cells.cells].mean(axis=1)
-    moduli = model.young.reshape(len(model.young), -1).mean(axis=1)
-    if len(moduli) != len(centres):
-        return np.full(len(vertices), moduli.mean())
-    return np.asarray(moduli[cKDTree(centres).query(vertices)[1]])
-
-
 def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     import trimesh
 
@@ -158,6 +189,8 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
         np.asarray(sphere.faces),
         np.full(len(sphere.vertices), entry.made_of.young),
         entry.made_of.poisson,
+        (entry.made_of,),
+        None,
         sounding,
         radius=radius,
         accuracy=accuracy,
@@ -181,19 +214,56 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
         np.asarray(surface.faces),
         np.full(len(surface.vertices), entry.made_of.young),
         entry.made_of.poisson,
+        (entry.made_of,),
+        None,
         solid.sounding(_damping(entry)),
         mesh,
         accuracy=solid.accuracy if entry.count else None,
     )
 
 
+def _of_parts(entry: ObjectEntry, mesh: str) -> ObjectSolid:
+    """The solid of a mesh of several regions, or that something holds."""
+    from carillon.fem.geometry import load_surface
+    from sound.strikes import struck_surface
+
+    given = load_surface(mesh, entry.unit)
+    composed = ComposedObject(entry, given)
+    surface = struck_surface(mesh, entry.unit, composed.parts_of)
+    vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+    which = composed.parts_of(vertices, faces)
+    solid = composed.solid(_how(entry))
+    doubt_unit(mesh, surface.extents, entry.unit)
+    factor = 1.0
+    if entry.pitch is not None:
+        factor = solid.factor_to(entry.pitch)
+        solid = solid.resized(factor)
+    of_parts = composed.materials
+    young, poisson = np.array([(each.young, each.poisson) for each in of_parts])[which].T
+    return ObjectSolid(
+        mass_properties(solid.model),
+        factor * vertices,
+        faces,
+        young,
+        poisson,
+        of_parts,
+        which,
+        solid.sounding(),
+        mesh,
+        accuracy=solid.accuracy if entry.count else None,
+        volume=_volume(solid.model),
+        is_held=solid.model.rigid_modes < RIGID_MODES,
+    )
+
+
+def _how(entry: ObjectEntry) -> Discretised:
+    return Discretised(entry.discretisation, entry.resolution, entry.components, entry.count)
+
+
 def _uniform(surface: Surface, entry: ObjectEntry, size: float) -> tuple[UniformSolid, float]:
     """The solid inside a surface of size 1, at a size; and the factor of the entry's pitch."""
     material = entry.made_of
-    how = Discretised(
-        entry.discretisation, entry.resolution, entry.components, material.poisson, entry.count
-    )
-    solid = uniform_solid(surface, entry.name, how)
+    solid = uniform_solid(surface, entry.name, _how(entry), material.poisson)
     return solid.sized(size, material.young, material.density, entry.pitch)
 
 

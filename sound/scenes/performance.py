@@ -1,5 +1,7 @@
 """The result of playing a scene: surfaces, motion and camera, sound and impacts."""
 
+from __future__ import annotations
+
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -32,13 +34,39 @@ class Appearance:
     """The surface of a named object of the scene.
 
     `vertices` (V, 3) [m] of the triangles `faces` (F, 3) are in the object's own axes, from its
-    centre of mass; `colour` (3,) is red, green and blue from 0 to 1 (sRGB).
+    centre of mass; `colour` (3,) is red, green and blue from 0 to 1 (sRGB), of most of it.  Where
+    it is of several colours, `colours` (k, 3) are these, and `painted` (F,) the number of each
+    triangle's.
     """
 
     name: str
     vertices: Array
     faces: NDArray[np.integer]
     colour: tuple[float, float, float]
+    colours: tuple[tuple[float, float, float], ...] = ()
+    painted: NDArray[np.integer] | None = None
+
+    @classmethod
+    def of_regions(
+        cls,
+        name: str,
+        vertices: Array,
+        faces: NDArray[np.integer],
+        colours: Sequence[tuple[float, float, float]],
+        which: NDArray[np.integer],
+    ) -> Appearance:
+        """A surface whose vertices have the colours of these numbers (V,)."""
+        distinct = tuple(dict.fromkeys(colours))
+        own = np.array([distinct.index(colour) for colour in colours])[which]
+        if len(distinct) == 1:
+            return cls(name, vertices, faces, distinct[0])
+        # What two corners have, or the first.
+        first, second, third = own[faces].T
+        painted = np.where(second == third, second, first)
+        sides = vertices[faces[:, 1:]] - vertices[faces[:, :1]]
+        areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        most = int(np.bincount(painted, areas, len(distinct)).argmax())
+        return cls(name, vertices, faces, distinct[most], distinct, painted)
 
 
 @dataclass(frozen=True)
@@ -143,7 +171,7 @@ class Performance:
     """dict [s]: wall time of each step of the work."""
     accuracies: list[dict[str, Any] | None] = field(default_factory=list)
     """B dicts: expected errors of each object's frequencies, see
-    `sound.scenes.uniform.UniformSolid`; None for a silent object, or if they are unknown."""
+    `sound.scenes.solved.SolvedSolid`; None for a silent object, or if they are unknown."""
     moved: dict[str, list[float]] = field(default_factory=dict)
     """dict: displacements (3,) [m] of overlapping objects that were separated at the start, by
     name."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.composition.entries import RegionEntry, SupportEntry
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
@@ -29,6 +30,8 @@ SOURCES = ("design", "modes", "mesh", "radius")
 """What an object may be, one of them."""
 FILES = ("design", "modes", "mesh", "heard_modes")
 """Keys of an object that name files."""
+REGION_FILES = ("mesh", "labels")
+"""Keys of a region that name files."""
 STANDARD_MATERIAL = "plastic"
 """Name of the material of designs and modes files, for what these do not tell."""
 _SUITS = {
@@ -39,6 +42,8 @@ _SUITS = {
     "damping": ("modes", "mesh", "radius"),
     "discretisation": ("mesh", "radius"),
     "components": ("mesh", "radius"),
+    "regions": ("mesh", "modes", "design"),
+    "supports": ("mesh",),
 }
 """Keys of an object that have a meaning for some sources alone."""
 
@@ -81,7 +86,7 @@ class ObjectEntry:
     )
     mesh: File | None = option(
         None,
-        "either builtin:NAME or a mesh file, relative to the scene, of one material; the y of glTF "
+        "either builtin:NAME or a mesh file, relative to the scene; the y of glTF "
         "points up and becomes z, of all other files z points up",
     )
     radius: Annotated[float, between(1e-4, 100.0)] | None = option(
@@ -89,8 +94,20 @@ class ObjectEntry:
     )
     material: Material | None = option(
         None,
-        "name of what it is made of; of a design or of modes it tells damping, roughness, friction "
-        "and bounce alone",
+        "name of what it is made of, where regions do not tell; of a design or of modes it tells "
+        "damping, roughness, friction and bounce alone",
+    )
+    regions: Annotated[tuple[RegionEntry, ...], Within(max_length=1000)] = option(
+        (),
+        "parts of a mesh that are of other materials, in the mesh's own axes: of several in one "
+        "place the last one counts, and where there is none the object's own material; of a design "
+        "or of modes, names of regions that these have, with the material of each, for friction, "
+        "bounce, roughness and colour",
+    )
+    supports: Annotated[tuple[SupportEntry, ...], Within(max_length=1000)] = option(
+        (),
+        "what holds a fixed mesh, or masses that are fixed to it, in the mesh's own axes; those of "
+        "modes and designs are in their files",
     )
     unit: MetresPerUnit = option(1.0)
     pitch: Annotated[float, between(20.0, 20_000.0)] | None = option(
@@ -125,7 +142,10 @@ class ObjectEntry:
     spin: Vector = option(
         (0.0, 0.0, 0.0), "how fast it turns about the axes of the scene at the start [rad/s]"
     )
-    fixed: bool = option(False, "whether it stays where it is; it sounds as a free one does")
+    fixed: bool = option(
+        False,
+        "whether it stays where it is; it sounds as a free one does, unless supports hold it",
+    )
     friction: Annotated[float, between(0.0, 10.0)] | None = option(
         None,
         "Coulomb's coefficient in place of the material's [1]; of two that touch, the larger one "
@@ -169,15 +189,44 @@ class ObjectEntry:
                 raise ValueError(f"{key} goes with {' or '.join(sources)}, found a {source}")
         if self.pitch is not None and self.count == 0:
             raise ValueError("pitch goes with a count of modes above 0; what is silent has none")
-        if self.material is None and source in ("mesh", "radius"):
+        if self.material is None and source in ("mesh", "radius") and not self.regions:
             raise ValueError(f"a {source} needs a material; name one")
+        self._require_whole(source)
+
+    def _require_whole(self, source: str) -> None:
+        """Refuse regions and supports that do not go together with the rest."""
+        names = [each.name for each in self.regions]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two regions are called {name!r}; give each a name of its own")
+        if source != "mesh":
+            for each in self.regions:
+                if each != RegionEntry(name=each.name, material=each.material):
+                    raise ValueError(
+                        f"region {each.name!r}: the {source} tells where it is and how stiff; "
+                        "give its name and its material alone"
+                    )
+        if not self.fixed and any(each.mass is None for each in self.supports):
+            raise ValueError("supports hold it, so it cannot move; add fixed: true, or leave them")
+        if self.pitch is not None and any(
+            each.mass is not None or each.spring is not None or each.pad is not None
+            for each in self.supports
+        ):
+            raise ValueError(
+                "pitch scales a mesh, which springs, pads and masses do not follow; leave out "
+                "pitch, or hold it without them"
+            )
 
     @cached_property
     def made_of(self) -> NamedMaterial:
         """Its material, with the numbers that the object has in place of the material's."""
-        material = self.material or named_material(STANDARD_MATERIAL)
+        told = self.as_told(self.material or named_material(STANDARD_MATERIAL))
+        return told if self.density is None else replace(told, density=self.density)
+
+    def as_told(self, material: NamedMaterial) -> NamedMaterial:
+        """A material with what the object says of its surface and damping in place of its own."""
         alpha, beta = self.damping or (material.alpha, material.beta)
-        keys = ("density", "friction", "restitution", "roughness", "colour")
+        keys = ("friction", "restitution", "roughness", "colour")
         given = {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
         return replace(material, alpha=alpha, beta=beta, **given)
 
@@ -299,6 +348,12 @@ class Scene:
     def files(self) -> list[str]:
         """Files that it is made from."""
         named = [getattr(each, key) for each in self.objects for key in FILES]
+        named += [
+            getattr(region, key)
+            for each in self.objects
+            for region in each.regions
+            for key in REGION_FILES
+        ]
         return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
 
 
@@ -328,5 +383,16 @@ def _in_folder(scene: Scene, folder: Path) -> Scene:
             for key, name in named.items()
             if name is not None and not name.startswith(BUILTIN_PREFIX)
         }
-        objects.append(replace(each, **files))
+        regions = tuple(_region_in_folder(region, folder) for region in each.regions)
+        objects.append(replace(each, **files, regions=regions))
     return replace(scene, objects=tuple(objects))
+
+
+def _region_in_folder(region: RegionEntry, folder: Path) -> RegionEntry:
+    named = {key: getattr(region, key) for key in REGION_FILES}
+    files: Any = {
+        key: str(folder / name)
+        for key, name in named.items()
+        if name is not None and not name.startswith(BUILTIN_PREFIX)
+    }
+    return replace(region, **files)

@@ -6,7 +6,14 @@ import json
 from carillon.parameters.command_line import add_options, collect
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
-from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import (
+    COMPOSED,
+    add_solid,
+    on_ranks,
+    parameters,
+    require_outputs,
+    write_json,
+)
 from studies.benchmark.options import BenchmarkOptions
 from studies.benchmark.row import benchmark_row, row_lines
 
@@ -19,7 +26,7 @@ EXAMPLES = """examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective")
+    add_solid(parser, "coarsen", "objective", *COMPOSED)
     add_options(parser, BenchmarkOptions)
     parser.add_argument("--out", help="also write the row to this JSON file")
     parser.add_argument("--json", action="store_true", help="print JSON")

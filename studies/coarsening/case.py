@@ -73,6 +73,8 @@ def rate_coarsening(
     if coarsening is None:
         raise UserError("nothing is coarsened: choose a coarsening other than none")
     problem = build_problem(replace(options, coarsen="none"))
+    if problem.model.supports is not None:
+        raise UserError("the solid is held; coarse models are rated on free ones, so leave it free")
     fine = problem.hexahedra
     exact, fine_cost = timed(lambda: _solve(fine, modes + SPARE))
     truth = SolvedModel(fine, exact.values, _gathered(exact))

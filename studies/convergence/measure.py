@@ -9,7 +9,7 @@ from mpi4py import MPI
 from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import UserError
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
@@ -45,8 +45,8 @@ def correction_history(
     Raises UserError if there are too few unknowns for so many modes, or `truth` is not of this
     solid.
 
-    Returns plain values: `exact` (modes - 6,), and `histories`, each with `start`, `acceleration`,
-    `values` (steps + 1, modes - 6) and their errors, `eigenvalue_error`.
+    Returns plain values: `rigid_modes`, `exact` (e,) of the others, and `histories`, each with
+    `start`, `acceleration`, `values` (steps + 1, e) and their errors, `eigenvalue_error`.
 
     Parameters
     ----------
@@ -60,7 +60,8 @@ def correction_history(
         Modes file of the same solid with its exact eigenvalues; SLEPc finds them if not given.
     """
     bcast_from_root(comm, lambda: check_mode_count(modes, cast(Solid, model).n_dofs))
-    exact = _exact(model, modes, truth, comm)[RIGID_MODES:]
+    rigid = bcast_from_root(comm, lambda: cast(Solid, model).rigid_modes)
+    exact = _exact(model, modes, truth, comm)[rigid:]
     local_mesh = distribute(model, None, seed, comm)
     layout = Layout.of_local_mesh(local_mesh, comm)
     system = assemble(local_mesh, comm, layout)
@@ -73,7 +74,7 @@ def correction_history(
         else:
             block = synthesize(local_mesh, keep, start.removeprefix("hcms-"), comm).vectors
         for acceleration in STEPWISE:
-            values = _correct(system, linear, block, modes - RIGID_MODES, steps, acceleration)
+            values = _correct(system, linear, block, modes - rigid, steps, acceleration)
             histories.append(
                 {
                     "start": start,
@@ -86,6 +87,7 @@ def correction_history(
         "modes": modes,
         "steps": steps,
         "n_dofs": local_mesh.n_dofs,
+        "rigid_modes": rigid,
         "exact": exact.tolist(),
         "histories": histories,
     }

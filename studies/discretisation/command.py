@@ -9,7 +9,14 @@ from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import between
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
-from solver.commands.running import add_solid, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import (
+    COMPOSED,
+    add_solid,
+    on_ranks,
+    parameters,
+    require_outputs,
+    write_json,
+)
 from studies.discretisation.case import rate_discretisations
 
 EXAMPLES = """example:
@@ -19,7 +26,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective", "discretisation", "fill", "lumped")
+    add_solid(parser, "coarsen", "objective", "discretisation", "fill", "lumped", *COMPOSED)
     parser.add_argument(
         "--modes",
         type=reader(Annotated[int, between(RIGID_MODES + 1, 1000)]),

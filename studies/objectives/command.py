@@ -10,7 +10,14 @@ from carillon.parameters.quantities import NumberOfModes
 from carillon.records.provenance import record
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver.analysis.problem import ProblemOptions
-from solver.commands.running import add_voxels, on_ranks, parameters, require_outputs, write_json
+from solver.commands.running import (
+    COMPOSED,
+    add_voxels,
+    on_ranks,
+    parameters,
+    require_outputs,
+    write_json,
+)
 from studies.objectives.measure import rate_objectives
 
 EXAMPLES = """example:
@@ -20,7 +27,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_voxels(parser, "objective")
+    add_voxels(parser, "objective", *COMPOSED)
     parser.add_argument(
         "--modes", type=reader(NumberOfModes), default=256, help="rigid included (default 256)"
     )

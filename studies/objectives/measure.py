@@ -139,8 +139,7 @@ def _coarsen(name: str, solid: _Solid) -> tuple[ElasticModel, float, float | Non
     begin = time.perf_counter()
     moduli, converged = _moduli(coarsening, solid.e)
     fitted = time.perf_counter() - begin
-    constants = {name: getattr(fine, name) for name in ("poisson", "density", "lumped")}
-    model = coarse_model(solid.blocks, moduli, coarsening.lumped_fraction, **constants)
+    model = coarse_model(solid.blocks, moduli, coarsening.lumped_fraction, **fine.constants)
     return model, fitted, converged
 
 

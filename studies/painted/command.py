@@ -5,6 +5,7 @@ import argparse
 from carillon.parameters.command_line import add_options, collect
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.commands.running import (
+    COMPOSED,
     add_outputs,
     add_voxels,
     on_ranks,
@@ -20,7 +21,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_voxels(parser)
+    add_voxels(parser, *COMPOSED)
     add_options(parser, PaintedOptions)
     add_outputs(parser)
 

@@ -3,7 +3,7 @@
 import argparse
 
 from carillon.parameters.command_line import add_options
-from solver.commands.running import add_outputs, add_solid, measure_solid
+from solver.commands.running import COMPOSED, add_outputs, add_solid, measure_solid
 from studies.profile.measure import ProfileOptions, profile, profile_lines
 
 EXAMPLES = """example:
@@ -13,7 +13,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser)
+    add_solid(parser, *COMPOSED)
     add_options(parser, ProfileOptions)
     add_outputs(parser)
 

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from carillon.arrays import Array
-from carillon.fem.model import RIGID_MODES, Solid
+from carillon.fem.model import Solid
 from carillon.processes.memory import reuse_freed_memory
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.components import distribute_by_parts, elastic_part
@@ -84,7 +84,8 @@ class _Run:
 
     def __init__(self, model: Solid | None, options: SolverOptions, comm: MPI.Comm) -> None:
         self.comm = comm
-        requested = options.modes - RIGID_MODES
+        rigid = bcast_from_root(comm, lambda: cast(Solid, model).rigid_modes)
+        requested = options.modes - rigid
         self.width = requested + default_guard(requested)
         self.own = {name: Tally() for name in ("partition", "assembly", "dense")}
         with self._phase("partition"):

@@ -91,6 +91,8 @@ for what, keys, says in (
     ("a name that cannot be printed", {"name": '"\\x07"'}, "name"),
     ("an object below the ground", {"position": "[0, 0, -1]"}, "overlap"),
     ("an object that touches nothing", {"position": "[0, 0, 5]"}, "nothing touches"),
+    ("a ball of regions", {"regions": "[{name: a}]"}, "regions goes with mesh"),
+    ("a ball that is held", {"supports": "[{where: x < 0}]"}, "supports goes with mesh"),
 ):
     hostile(f"object with {what}", PLAY, says, files={"s.yaml": scene(ball(**keys))})
 for what, keys, says in (
@@ -101,6 +103,38 @@ for what, keys, says in (
     ("no such mesh", {"mesh": "nowhere.obj", "material": "steel"}, "nowhere.obj"),
     ("no such built-in mesh", {"mesh": "builtin:moon", "material": "steel"}, "moon"),
     ("a density of a design", {"design": "d.h5", "density": "1000"}, "density"),
+    ("places in modes", {"modes": "m.h5", "regions": "[{name: a, where: x < 0}]"}, "tells where"),
+    ("regions not in modes", {"modes": "m.h5", "regions": "[{name: a}]"}, "has no region 'a'"),
+    (
+        "a region of code",
+        {"mesh": "builtin:bar", "regions": "[{name: a, where: __import__('os') < 1}]"},
+        "where a number belongs",
+    ),
+    (
+        "holes",
+        {"mesh": "builtin:bar", "regions": "[{name: a, material: iron, where: x < 0}]"},
+        "are of no region",
+    ),
+    (
+        "no such material",
+        {"mesh": "builtin:bar", "regions": "[{name: a, material: irn}]"},
+        "did you mean iron",
+    ),
+    (
+        "what is held and moves",
+        {"mesh": "builtin:bar", "material": "steel", "supports": "[{where: x < 0}]"},
+        "fixed: true",
+    ),
+    (
+        "nothing to hold",
+        {
+            "mesh": "builtin:bar",
+            "material": "steel",
+            "fixed": "true",
+            "supports": "[{where: x > 9}]",
+        },
+        "meets nothing",
+    ),
 ):
     nothing = {"radius": "", "count": "", "material": ""}
     files = {"s.yaml": scene(ball(**nothing | keys)), "m.h5": MODES, "d.h5": DESIGN}

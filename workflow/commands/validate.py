@@ -162,6 +162,8 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     model = {
         "title": title,
         "mesh": arguments.mesh if is_builtin else _path(arguments.mesh),
+        "regions": _path(arguments.regions) if arguments.regions else None,
+        "fix": list(arguments.fix or []),
         "material": arguments.material if named else _path(arguments.material),
         **{key: given[key] for key in (*keys, "strike", "observed")},
     }
@@ -187,8 +189,8 @@ def _path(text: str) -> str:
 
 def _checked_size(arguments: argparse.Namespace) -> str:
     """Sizes of mesh and voxels, made once to tell all that is wrong before anything runs."""
-    load_forest(arguments.forest, arguments.poisson)
     solid = build_problem(collect(ProblemOptions, arguments))
+    load_forest(arguments.forest, *solid.regions.ratios)
     for name in ("strike", "observed"):
         point = getattr(arguments, name)
         if point is not None:

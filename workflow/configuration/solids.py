@@ -22,7 +22,7 @@ from carillon.parameters.quantities import (
     Seed,
 )
 from carillon.parameters.sentences import did_you_mean
-from workflow.configuration.section import File, Several, Title
+from workflow.configuration.section import File, Line, Several, Title
 
 FILES = {"bunny": "stanford-bunny.obj", "teapot": "teapot.obj"}
 """Mesh files of solids that studies measure by default, beside built-in ones of their own names."""
@@ -60,6 +60,7 @@ ModelModes = Annotated[
     Within("pages list them all and compare half a dozen elastic ones", ge=12, le=10_000),
     "modes computed, rigid ones included [1]",
 ]
+Place = Annotated[Line, Within(min_length=1, max_length=1000)]
 Coordinate = Annotated[float, Ge(-1e12), Le(1e12)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
 Solids = Annotated[
@@ -120,6 +121,15 @@ class ModelEntry(SolidEntry):
     material: File = option(
         "smooth",
         f"one of {', '.join(MATERIALS)}, or a file with one modulus per voxel [Pa]",
+    )
+    regions: File | None = option(
+        None,
+        "YAML file with the regions of the solid and what holds it, as of `carillon modes "
+        "--regions`; moduli of the material are then over 1 GPa, as factors on the regions' own, "
+        "and density and Poisson's ratio are theirs",
+    )
+    fix: Annotated[tuple[Place, ...], Within(max_length=1000)] | None = option(
+        None, "what is held: comparisons of x, y and z [m], or region:NAME; nothing if null"
     )
     unit: MetresPerUnit = option(1.0)
     density: Density = option(1000.0)

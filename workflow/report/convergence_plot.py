@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from carillon.fem.model import RIGID_MODES
 from studies.base.colours import COLOURS
 from studies.base.results import Results
 from workflow.report.convergence_tables import ACCELERATIONS, PAPER, RANDOM, start_label
@@ -24,7 +23,7 @@ HCMS_COLOURS = ("hcms_ec", "hcms", "ddfem_slepc")
 def convergence_figure(results: Results, model: str) -> Figure:
     """Eigenvalues from several starts, and small multiples of their errors."""
     history = results.read_json(f"models/{model}/convergence.json")
-    exact = np.array(history["exact"])
+    exact, first = np.array(history["exact"]), history["rigid_modes"] + 1
     curves = {
         (curve["acceleration"], curve["start"]): np.array(curve["values"])
         for curve in history["histories"]
@@ -36,12 +35,12 @@ def convergence_figure(results: Results, model: str) -> Figure:
         1 + len(ACCELERATIONS), len(starts), height_ratios=(1.2, *(1 for _ in ACCELERATIONS))
     )
     paper = {start: curves[PAPER, start] for start in starts}
-    _plot_eigenvalues(figure.add_subplot(grid[0, :]), paper, exact, colours)
+    _plot_eigenvalues(figure.add_subplot(grid[0, :]), paper, exact, colours, first)
     shared = None
     for row, (acceleration, label) in enumerate(ACCELERATIONS.items(), start=1):
         for column, start in enumerate(starts):
             axes = figure.add_subplot(grid[row, column], sharey=shared, sharex=shared)
-            _plot_errors(axes, curves[acceleration, start], exact, colours[start])
+            _plot_errors(axes, curves[acceleration, start], exact, colours[start], first)
             if row == 1:
                 axes.set_title(start_label(start).removesuffix(" interfaces"))
             if row == len(ACCELERATIONS):
@@ -64,27 +63,27 @@ def _colours(starts: list[str]) -> dict[str, str]:
 
 
 def _plot_eigenvalues(
-    axes: Any, curves: dict[str, Array], exact: Array, colours: dict[str, str]
+    axes: Any, curves: dict[str, Array], exact: Array, colours: dict[str, str], first: int
 ) -> None:
     for start, steps in curves.items():
         for step, style in ((0, "--"), (len(steps) - 1, "-")):
             label = f"{start_label(start)}, {_corrections(step)}"
             values = steps[step]
             axes.semilogy(
-                _modes(values), values, style, color=colours[start], linewidth=1.3, label=label
+                _modes(values, first), values, style, color=colours[start], lw=1.3, label=label
             )
     axes.semilogy(
-        _modes(exact), exact, color=COLOURS[TRUTH], linewidth=2.6, alpha=0.9, label="ground truth"
+        _modes(exact, first), exact, color=COLOURS[TRUTH], lw=2.6, alpha=0.9, label="ground truth"
     )
     axes.set(xlabel="mode number", ylabel="eigenvalue [rad²/s²]", title="Eigenvalues")
     axes.legend(ncols=2, loc="lower right")
-    axes.set_xlim(RIGID_MODES + 1, RIGID_MODES + len(exact))
+    axes.set_xlim(first, first + len(exact) - 1)
 
 
-def _plot_errors(axes: Any, steps: Array, exact: Array, colour: str) -> None:
+def _plot_errors(axes: Any, steps: Array, exact: Array, colour: str, first: int) -> None:
     for step, values in enumerate(steps):
         axes.semilogy(
-            _modes(exact),
+            _modes(exact, first),
             visible(values / exact - 1.0),
             color=colour,
             alpha=0.3 + 0.7 * step / max(1, len(steps) - 1),
@@ -99,8 +98,8 @@ def visible(errors: ArrayLike) -> Array:
     return np.maximum(np.abs(np.asarray(errors, dtype=float)), SMALLEST_ERROR)
 
 
-def _modes(values: Array) -> NDArray[np.int64]:
-    return np.arange(RIGID_MODES + 1, RIGID_MODES + 1 + len(values))
+def _modes(values: Array, first: int) -> NDArray[np.int64]:
+    return np.arange(first, first + len(values))
 
 
 def _corrections(count: int) -> str:

@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from carillon.drawing.solid import DRAWN_AMPLITUDE, Skin, draw, guess_up
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.faces import surface_quads
-from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ModesFile, read_modes
 from studies.base.colours import COLOURS, MUTED
 from studies.base.media import cropped, save_pixels, solid_picture
@@ -33,7 +32,10 @@ CLUSTER_WIDTH = 0.05
 def draw_first_elastic_modes(
     results: Run, model: str, paths: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Draw mode 7 of every shown variant to `paths`; return frequency and likeness of each."""
+    """Draw the first elastic mode of every shown variant to `paths`.
+
+    Returns number, frequency and likeness of each.
+    """
     truth = read_modes(results.modes_path(model, TRUTH))
     reference = displacement(truth, truth.model.rigid_modes)
     skin = results.skin(model, truth.model)
@@ -46,6 +48,7 @@ def draw_first_elastic_modes(
         drawn = partial(draw, mesh=file.mesh, displacement=motion, **view)
         pictures.append(solid_picture(drawn))
         description[variant] = {
+            "mode": truth.model.rigid_modes + 1,
             "hertz": float(file.frequencies[file.model.rigid_modes]),
             "likeness": likeness,
             "combined": len(cluster(truth.frequencies, truth.model.rigid_modes)),
@@ -62,7 +65,7 @@ def displacement(file: ModesFile, index: int) -> Array:
     return file.modes[:, index].reshape(-1, 3)
 
 
-def cluster(frequencies: Array, rigid: int = RIGID_MODES) -> list[int]:
+def cluster(frequencies: Array, rigid: int) -> list[int]:
     """Indices of the modes that share the first elastic frequency, as in symmetric bodies."""
     first = frequencies[rigid]
     near = np.abs(frequencies[rigid:] / first - 1.0) <= CLUSTER_WIDTH
@@ -130,7 +133,8 @@ def overview_figure(results: Run, model: str) -> Figure:
             draw(body, file.mesh, motion, **view)
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
             hertz = file.frequencies[file.model.rigid_modes]
-            text = f"{file.mesh.n_dofs:,} unknowns, mode 7 at {hertz:,.0f} Hz"
+            mode = file.model.rigid_modes + 1
+            text = f"{file.mesh.n_dofs:,} unknowns, mode {mode} at {hertz:,.0f} Hz"
             figure.text(left + 0.01, 0.87, text, color=MUTED)
         rows = [row for row in results.table("frequencies").rows if row["model"] == model]
         _plot_spectra(figure.add_axes((0.68, 0.13, 0.305, 0.69)), rows)

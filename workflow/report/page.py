@@ -4,10 +4,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from carillon.composition.entries import SupportEntry
 from studies.base import parts
 from studies.base.page import Section, StudyPage, listed_modes, origins, section
 from studies.base.parts import grid, html, plot, prose, unbroken
 from studies.base.table import Row, Table, read_table
+from workflow.composition import composition_of
 from workflow.report import verdict
 from workflow.report.convergence_tables import convergence_sentences
 from workflow.report.findings import findings, headline
@@ -59,14 +61,45 @@ def page(run: Run, tables: Tables) -> StudyPage:
     )
 
 
+def material_facts(run: Run, model: str) -> list[Any]:
+    """What a solid is made of and what holds it, in a few words."""
+    entry, of_model = composition_of(run.config, model), run.config["models"][model]
+    field, known = of_model["material"], run.config["poisson"]
+    facts: list[Any] = [f"{field} material"]
+    if entry.regions:
+        named = (f"{each.name} of {each.material or 'given moduli'}" for each in entry.regions)
+        factors = [] if field == "uniform" else [f"{field} factors on their moduli"]
+        facts = [*named, *factors]
+    else:
+        density = html("<span>density {density:count} kg/m³</span>", **of_model)
+        facts += [density, f"Poisson’s ratio {known}"]
+    return [*facts, *map(support_in_words, entry.supports)]
+
+
+def support_in_words(support: SupportEntry) -> str:
+    """What holds a solid at one of its places."""
+    place = f"where {support.where}"
+    if support.at is not None:
+        point = ", ".join(f"{part:g}" for part in support.at)
+        within = "" if support.radius is None else f"within {support.radius:g} m of "
+        place = f"{within or 'at '}({point}) m"
+    along = "" if support.along == "xyz" else f" along {support.along}"
+    if support.mass is not None:
+        return f"{support.mass:g} kg {place}"
+    if support.pad is not None:
+        return f"on {1e3 * (support.thickness or 0.0):g} mm of {support.pad}{along} {place}"
+    return f"{'held' if support.spring is None else 'on springs'}{along} {place}"
+
+
 def mode_pictures(run: Run, model: str) -> Markup:
     """The first elastic mode by all variants that are shown."""
     described = run.read_json(f"figures/{model}-mode.json")
+    first = described[TRUTH]["mode"]
     shown = []
     for variant in run.shown_variants(model):
         metadata = described[variant]
         source = parts.picture_uri(run.figure(f"{model}-mode-{variant}.png"))
-        alt = f"{run.titles[model]}, mode 7 by {VARIANTS[variant].label}"
+        alt = f"{run.titles[model]}, mode {first} by {VARIANTS[variant].label}"
         known = "reference" if variant == TRUTH else f"likeness {metadata['likeness']:.4f}"
         picture = parts.image({**metadata, "source": source}, alt)
         line = html(
@@ -75,14 +108,15 @@ def mode_pictures(run: Run, model: str) -> Markup:
         shown.append(picture + line)
     combined = described[TRUTH]["combined"]
     mixed = (
-        f""" Modes 7–{6 + combined} lie within 5 % of each other, so any mixture of them is nearly
-        a mode; of each method’s {combined} the mixture closest to the ground truth is shown."""
+        f""" Modes {first}–{first - 1 + combined} lie within 5 % of each other, so any
+        mixture of them is nearly a mode; of each method’s {combined} the mixture closest to the
+        ground truth is shown."""
         if combined > 1
         else ""
     )
-    about = f"""The first elastic mode (mode 7), drawn with the same sign, amplitude and colours:
-        dark is at rest, bright moves most. Likeness is the cosine between the motion shown and the
-        ground truth’s; 1 is the same shape.{mixed}"""
+    about = f"""The first elastic mode (mode {first}), drawn with the same sign, amplitude and
+        colours: dark is at rest, bright moves most. Likeness is the cosine between the motion shown
+        and the ground truth’s; 1 is the same shape.{mixed}"""
     return parts.figure(parts.pictures(shown), caption=about)
 
 
@@ -138,9 +172,7 @@ def _model(run: Run, tables: Tables, model: str) -> Markup:
         parts.facts(
             settings["mesh"],
             f"resolution {settings['resolution']}",
-            f"{settings['material']} material",
-            html("<span>density {density:count} kg/m³</span>", **settings),
-            f"Poisson’s ratio {run.config['poisson']}",
+            *material_facts(run, model),
             html("<span>{unknowns:count} unknowns{}</span>", _coarse(summary), **summary),
             f"{summary['modes']} modes",
         ),

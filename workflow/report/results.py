@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from carillon.drawing.solid import Skin
-from carillon.fem.geometry import load_surface
 from carillon.fem.model import Solid
 from solver.files.modes_file import CHECKS, FINE_TAKEN, ModesFile, read_modes
 from studies.base.conditions import Record
 from studies.base.results import Results
 from studies.base.skins import skin_of
 from workflow import settings
+from workflow.composition import surface_of
 from workflow.report.study import MEASURES
 from workflow.variants import candidates_of, further_of, shown_of, variants_of
 
@@ -59,8 +59,7 @@ class Run(Results):
         part = self.config["models"][model]
         if part["discretisation"] == "voxel":
             return None
-        surface = load_surface(settings.mesh_of(self.config, model), part["unit"])
-        return skin_of(solid, surface)
+        return skin_of(solid, surface_of(self.config, model))
 
     def modes_path(self, model: str, variant: str) -> Path:
         """Modes file of a model and variant."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import FINE_TAKEN
 from solver.refinement.errors import FROM_SOLID as DISTANCE
 from studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
@@ -84,7 +83,7 @@ def frequencies(run: Run) -> Iterator[Row]:
     for model, spectra in run.spectra.items():
         shown = run.shown_variants(model)
         count = min(len(spectra[variant].frequencies) for variant in shown)
-        for index in range(RIGID_MODES, count):
+        for index in range(spectra[TRUTH].model.rigid_modes, count):
             row = {variant: float(spectra[variant].frequencies[index]) for variant in shown}
             errors = {f"{name}_error": row[name] / row[TRUTH] - 1.0 for name in shown[1:]}
             yield {"model": model, "mode": index + 1, **row, **errors}

@@ -25,6 +25,8 @@ def model_arguments(wildcards, resolution=None):
         "discretisation": model["discretisation"] if cells else None,
         "material": settings.material_of(config, wildcards.model),
         "poisson": config["poisson"],
+        "regions": settings.regions_of(config, wildcards.model),
+        "fix": model["fix"],
         **{key: model[key] for key in SOLID_OPTIONS},
     }
     return [settings.mesh_of(config, wildcards.model), *options(how)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from carillon.files.yaml_input import read_own_yaml
 from solver.files.modes_file import frequencies
-from solver.verification.matching import AUDIBLE_FIRST, AUDIBLE_LAST
+from solver.verification.matching import AUDIBLE_LAST
 from studies.base.numbers import show
 from workflow.report.findings import headline
 from workflow.validation import limits
@@ -136,7 +136,7 @@ def _coarsening(evidence: Evidence) -> Iterator[Criterion]:
         "frequency_rms": Worst(rms, tolerances["frequency_rms"]),
         "frequency_worst": Worst(worst, tolerances["frequency_worst"]),
     }
-    modes = f"modes {AUDIBLE_FIRST}–{last}"
+    modes = f"modes {evidence.shown[TRUTH].model.rigid_modes + 1}–{last}"
     return _criteria(evidence, "coarsening", COARSENED, limited, modes=modes)
 
 
@@ -149,7 +149,8 @@ def _from_solid(evidence: Evidence) -> Iterator[Criterion]:
         for key, value in values.items()
         if evidence.tolerances[key] is not None
     }
-    first, last = distance.get("modes", (AUDIBLE_FIRST, AUDIBLE_LAST))
+    rigid = evidence.shown[TRUTH].model.rigid_modes
+    first, last = distance.get("modes", (rigid + 1, AUDIBLE_LAST))
     return _criteria(evidence, SOLID, SOLID, limited, modes=f"modes {first}–{last}")
 
 

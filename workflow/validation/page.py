@@ -11,7 +11,6 @@ from markupsafe import Markup, escape
 
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
-from carillon.fem.geometry import load_surface
 from carillon.records import provenance
 from studies.base import parts
 from studies.base.media import embedded, inlined
@@ -19,7 +18,8 @@ from studies.base.page import Section, StudyPage, listed_modes, origins, section
 from studies.base.parts import grid, html, plot, prose
 from studies.base.table import Table
 from workflow import settings
-from workflow.report.page import mode_pictures
+from workflow.composition import surface_of
+from workflow.report.page import material_facts, mode_pictures
 from workflow.report.verdict import variants_key
 from workflow.validation import plots, strike
 from workflow.validation.criteria import verdict
@@ -58,7 +58,7 @@ def page(evidence: Evidence, tables: Tables) -> StudyPage:
         ),
         sections=[
             *_judged(evidence, tables),
-            _solid(evidence),
+            _solid(evidence, tables["regions"]),
             section(
                 "Spectrum",
                 plot(
@@ -171,10 +171,10 @@ def _cells(evidence: Evidence) -> FiniteCells | None:
     return model.cells if isinstance(model, FiniteCellModel) else None
 
 
-def _solid(evidence: Evidence) -> Section:
+def _solid(evidence: Evidence, regions: Table) -> Section:
     mesh_name = settings.mesh_of(evidence.config, evidence.model)
     part = evidence.settings
-    surface = load_surface(mesh_name, part["unit"])
+    surface = surface_of(evidence.config, evidence.model)
     model = evidence.shown[TRUTH].model
     mesh, cells = model.mesh, _cells(evidence)
     young = model.young if cells else model.young[:, 0]
@@ -219,13 +219,13 @@ def _solid(evidence: Evidence) -> Section:
         parts.facts(
             mesh_name,
             f"resolution {part['resolution']}",
-            f"{part['material']} material",
-            html("<span>density {density:count} kg/m³</span>", **part),
-            f"Poisson’s ratio {evidence.config['poisson']}",
+            *material_facts(evidence, evidence.model),
             html("<span>mass {:fraction} kg</span>", model.mass),
             f"mesh {strike.lengths(sides)} m",
             "" if cells else f"voxels {strike.lengths(np.ptp(mesh.nodes, axis=0))} m",
         ),
+        *([grid(regions)] if regions.rows else []),
+        prose(_held(evidence)),
         parts.figure(parts.pictures(shown, "three"), caption=about),
         plot(
             inlined(plots.moduli_figure(young), "moduli"),
@@ -233,6 +233,17 @@ def _solid(evidence: Evidence) -> Section:
             width="narrow",
         ),
     )
+
+
+def _held(evidence: Evidence) -> str:
+    """What supports leave of a solid's rigid motions; empty if nothing supports it."""
+    model = evidence.shown[TRUTH].model
+    if model.supports is None:
+        return ""
+    mass = float(model.supports.mass.sum())
+    with_mass = f", and {mass:g} kg are fixed to it" if mass else ""
+    return f"""What holds it acts at {len(model.supports):,} points and leaves it
+        {model.rigid_modes or "none"} of six rigid motions{with_mass}."""
 
 
 def _counted(evidence: Evidence) -> str:

@@ -4,14 +4,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from carillon.fem.geometry import load_surface
 from solver.response.response import STRIKE_SECONDS
 from studies.base import parts
 from studies.base.media import embedded, inlined, wav_uri
 from studies.base.page import Section, section
 from studies.base.parts import grid, html, plot, prose, unbroken
 from studies.base.table import Table
-from workflow import settings
+from workflow.composition import surface_of
 from workflow.report.verdict import variant_name
 from workflow.validation import plots
 from workflow.validation.evidence import COARSENED, Evidence
@@ -20,6 +19,8 @@ from workflow.variants import TRUTH, VARIANTS
 
 CHOSEN = """ The ground truth chose both: where its six lowest elastic modes give way most to a
     push, and what moves most far from there."""
+RIGID_MOTION = "What is not held also flies off and turns. That rigid motion is left out."
+HELD = "It is held, so there is no rigid motion."
 STRIKES = """Spectrograms of three strikes, {} s apart, at the arrow, at the ring and at {}, by a
     force of half a sine of {:fraction} ms. Each is heard at the point that is struck: the sum of
     a<sub>k</sub> exp(−ξ<sub>k</sub>ω<sub>k</sub>t) sin(ω<sub>d</sub>t) over the modes from 20 Hz to
@@ -50,13 +51,14 @@ def motion(evidence: Evidence, table: Table) -> Section:
         {_place(evidence, "strike")}; the ring is the point that is watched, at
         {_place(evidence, "observed")}, in the mesh’s own coordinates.{"" if chosen else CHOSEN}"""
     how = html(
-        """A free body also flies off and turns. That rigid motion is left out; the elastic modes
-        alone are superposed. Damping is Rayleigh’s, {mass_damping:fraction} s⁻¹ of the mass and
-        {stiffness_damping:small} s of the stiffness.{}""",
+        """{rigid} The elastic modes alone are superposed. Damping is Rayleigh’s,
+        {mass_damping:fraction} s⁻¹ of the mass and {stiffness_damping:small} s of the
+        stiffness.{}""",
         """ The coarsened solid is watched at the same point, interpolated in the cell that it lies
         in."""
         if coarse
         else "",
+        rigid=RIGID_MOTION if model.rigid_modes else HELD,
         **response.attributes,
     )
     about = html(
@@ -84,9 +86,7 @@ def sound(evidence: Evidence) -> Section:
     """Sound and spectrogram of every method; a sentence if no mode of the truth is heard."""
     response = evidence.response
     if not response.responses[TRUTH].sound.any():
-        surface = load_surface(
-            settings.mesh_of(evidence.config, evidence.model), evidence.settings["unit"]
-        )
+        surface = surface_of(evidence.config, evidence.model)
         sides = lengths(np.ptp(np.asarray(surface.bounds), axis=0))
         silent = f"""Nothing is to be heard: no elastic mode lies between 20 Hz and 20 kHz. Check
             the unit of the mesh; the solid measures {sides} m."""

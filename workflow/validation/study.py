@@ -8,6 +8,9 @@ VALIDATION = Study(
     folder="",
     title="Validation",
     results="evidence:Evidence",
-    tables=("criteria", "solid", "errors", "shapes", "audits", "responses", "provenance"),
+    tables=(
+        *("criteria", "solid", "regions", "errors", "shapes", "audits", "responses"),
+        "provenance",
+    ),
     file="validation/{model}.html",
 )

@@ -1,10 +1,12 @@
 """Tables of the page; their files are named after the model."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from studies.base.table import Column, Row, each, hidden, table
+from workflow.composition import composition_of
 from workflow.validation.criteria import judge
 from workflow.validation.distance import distance_in_words
 from workflow.validation.evidence import Evidence
@@ -58,6 +60,41 @@ def solid(evidence: Evidence) -> Iterator[Row]:
 
 
 @table(
+    Column("region", "Region"),
+    Column("material", "Material"),
+    Column("young", "E [GPa]", "fraction"),
+    Column("poisson", "ν", "fraction"),
+    Column("density", "Density [kg/m³]", "fraction"),
+    Column("volume", "Volume [m³]", "small"),
+    keys="region",
+)
+def regions(evidence: Evidence) -> Iterator[Row]:
+    """What each region is made of: Young's modulus, before the material's factors and of wood the
+    largest along its axes, Poisson's ratio of isotropic ones, and density."""
+    model = evidence.shown[TRUTH].model
+    entry = composition_of(evidence.config, evidence.model)
+    named = {each.name: each.material for each in entry.regions}
+    if not entry.regions:
+        return
+    table, names = model.regions, np.array(model.regions.names)
+    for name in named:
+        # Of wood whose axes vary there is a row for each direction.
+        rows = np.flatnonzero(names == name)
+        first, density = rows[0], table.density[rows[0]]
+        denser = replace(table, density=np.where(names == name, 2.0, 1.0) * table.density)
+        law = table.laws[first]
+        kind = "isotropic" if law.poisson is not None else "with a grain"
+        yield {
+            "region": name,
+            "material": f"{named[name] or 'given moduli'}, {kind}",
+            "young": float(table.young[first]) / 1e9,
+            "poisson": law.poisson,
+            "density": float(density),
+            "volume": (model.with_regions(denser).mass - model.mass) / float(density),
+        }
+
+
+@table(
     Column("mode", "Mode", "count"),
     Column("truth", "Ground truth", "hertz"),
     lambda evidence: each(
@@ -92,7 +129,7 @@ def errors(evidence: Evidence) -> Iterator[Row]:
     Column("median", "Median angle", "angle"),
     Column("largest", "Largest angle", "angle"),
     Column("modes", "in modes"),
-    Column("likeness", "Likeness of mode 7", "fraction"),
+    Column("likeness", "Likeness of the first elastic mode", "fraction"),
 )
 def shapes(evidence: Evidence) -> Iterator[Row]:
     """Mass-weighted angles between the ground truth's modes and each method's. Modes whose

@@ -6,12 +6,13 @@ the lattice; see `regions_of_cells`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
+from carillon.fem.elasticity import DEFAULT_POISSON
 from carillon.fem.finite_cells.cells import FLOOR, FiniteCells
 from carillon.fem.finite_cells.kinks import Borders, Kinks
 from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
@@ -140,4 +141,6 @@ def kinks_of(
         side_moduli(borders, every, law[borders.cell], values[borders.cell])
         for values in (tables[0], volumes)
     )
-    return Kinks.in_equilibrium(borders, regions, moduli, inside)
+    # Whatever Poisson's ratio is, kinks follow the nodes alike: a search that moves it keeps them.
+    alike = regions.with_poisson(DEFAULT_POISSON)
+    return replace(Kinks.in_equilibrium(borders, alike, moduli, inside), regions=regions)

@@ -60,7 +60,6 @@ class SustainedForce:
 
 def sustained_force(
     contact: SustainedContact,
-    roughness: float,
     seconds: float,
     step_seconds: float,
     rate: int,
@@ -69,8 +68,8 @@ def sustained_force(
     """The sustained force of a pair of bodies; None if there is none.
 
     A bump of the height h presses the bodies together by another h, which changes their force by h
-    times the stiffness of the contact, at most by all of it.  The roughness [m] is that of both
-    surfaces together, at random by the seed.  The scene lasts so many seconds, and a step of the
+    times the stiffness of the contact, at most by all of it.  Heights are those of the roughest
+    point in each block, at random by the seed.  The scene lasts so many seconds, and a step of the
     simulation `step_seconds`; the rate is in Hz.
     """
     times = contact.contacts.steps * step_seconds
@@ -92,6 +91,8 @@ def sustained_force(
     speeds = np.add.reduceat(pace, firsts) / points
     springs = stiffness(forces, radius, modulus)
     words = np.random.SeedSequence([seed, *(each + 1 for each in contact.pair)])
+    rough = contact.spots.roughness[chosen]
+    roughest = float(rough.max())
     # Distances at the end of each block, less those from each of its samples on.
     ahead = (np.arange(BLOCK) + 1.0) / BLOCK - 1.0
     way = (np.cumsum(speeds) * BLOCK / rate)[:, None] + (speeds * BLOCK / rate)[:, None] * ahead
@@ -99,10 +100,12 @@ def sustained_force(
         way.ravel(),
         np.repeat(speeds, BLOCK),
         np.repeat(2.0 * patch_radius(forces, radius, modulus), BLOCK),
-        roughness,
+        roughest,
         int(words.generate_state(1, np.uint64)[0]),
         rate,
     )
+    if roughest > 0.0:
+        heights *= np.repeat(np.maximum.reduceat(rough, firsts) / roughest, BLOCK)
     fluctuation = np.clip(heights * np.repeat(springs / forces, BLOCK), -1.0, 1.0)
     b, a = butter(1, LOWEST_HERTZ, "highpass", fs=rate)
     courses = lfilter(b, a, fluctuation - fluctuation[0]).reshape(-1, BLOCK)

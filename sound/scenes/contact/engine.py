@@ -156,14 +156,16 @@ def _add_body(mujoco: ModuleType, spec: Any, engine: EngineEntry, number: int, b
     )
     if not entry.fixed:
         added.add_freejoint()
-    contact = _contact_options(engine, entry.made_of.friction, entry.made_of.restitution)
+    contacts = [
+        _contact_options(engine, each.friction, each.restitution) for each in body.materials
+    ]
     if body.radius is not None:
         size = [body.radius, 0.0, 0.0]
-        added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **contact)
-    for part, corners in enumerate(body.parts):
+        added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **contacts[0])
+    for part, (corners, material) in enumerate(zip(body.parts, body.of_parts)):
         name = f"{number} {part}"
         spec.add_mesh(name=name, uservert=corners.ravel().tolist())
-        added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **contact)
+        added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **contacts[material])
 
 
 def _contact_options(engine: EngineEntry, friction: float, restitution: float) -> dict[str, Any]:

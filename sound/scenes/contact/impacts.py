@@ -47,12 +47,13 @@ class Spots(NamedTuple):
 
     `vertices` (c, 2) are the nearest ones of each surface, `GROUND` for the ground; `curvatures`
     (c,) [1/m] are 1 / R, `compliances` (c,) [1/Pa] 1 / E of the effective radius and modulus, see
-    `sound.scenes.hertz`.
+    `sound.scenes.hertz`; `roughness` (c,) [m] is that of both surfaces together.
     """
 
     vertices: NDArray[np.integer]
     curvatures: Array
     compliances: Array
+    roughness: Array
 
 
 class Touch:
@@ -61,6 +62,7 @@ class Touch:
     def __init__(self, bodies: list[Body], ground: NamedMaterial) -> None:
         self._bodies = bodies
         self._ground = float(compliance(ground.young, ground.poisson))
+        self._rough_ground = ground.roughness
         shapes = {id(body.shape): body.shape for body in bodies}
         trees = {key: cKDTree(shape.vertices) for key, shape in shapes.items()}
         self._trees = [trees[id(body.shape)] for body in bodies]
@@ -69,16 +71,19 @@ class Touch:
         """The surfaces of a pair of bodies at their points of contact."""
         vertices = np.full((len(contacts), 2), GROUND)
         curvatures, compliances = np.zeros(len(contacts)), np.zeros(len(contacts))
+        rough = np.zeros((2, len(contacts)))
         for side, number in enumerate(pair):
             if number == GROUND:
                 compliances += self._ground
+                rough[side] = self._rough_ground
                 continue
             body = self._bodies[number]
             near = self._trees[number].query(contacts.places[:, side])[1]
             vertices[:, side] = near
             curvatures += 1.0 / body.shape.radii[near]
             compliances += body.compliance[near]
-        return Spots(vertices, curvatures, compliances)
+            rough[side] = np.array([each.roughness for each in body.materials])[body.which[near]]
+        return Spots(vertices, curvatures, compliances, np.hypot(*rough))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from sound.scenes.film.ground import SKYLIGHT, SUNLIGHT, Ground, sun_behind, unit
 from sound.scenes.film.rays import Flags, Floats, PlacedSurface, RayedSurface, View, Window
-from sound.scenes.performance import Picture, linear_light
+from sound.scenes.performance import Appearance, Picture, linear_light
 
 Bytes = NDArray[np.uint8]
 Numbers = NDArray[np.intp]
@@ -41,7 +41,7 @@ class Stage:
         height = -np.inf if picture.ground is None else picture.ground
         self.ground = Ground(height, self.view, self.sun)
         self.surfaces = [RayedSurface(each.vertices, each.faces) for each in picture.objects]
-        self.colours = [linear_light(each.colour).astype(np.float32) for each in picture.objects]
+        self.colours = [_paint(each) for each in picture.objects]
 
     def frame(self, seconds: float) -> Bytes:
         """Frame (H, W, 3), sRGB, at a time."""
@@ -84,30 +84,36 @@ class _Moment:
         Where there is no solid, it is the light `behind` (n, 3), and the number is `NOBODY`.
         """
         directions = self.stage.view.directions(places)
-        owners, ways, normals = self._met(places, directions)
+        owners, ways, normals, faces = self._met(places, directions)
         light = behind.copy()
         for number in range(len(self.placed)):
             own = np.flatnonzero(owners == number)
             points = self.stage.view.eye + ways[own, None] * directions[own]
-            light[own] = self._shaded(number, points, normals[own], directions[own])
+            colours = self.stage.colours[number][faces[own]]
+            light[own] = self._shaded(number, points, normals[own], directions[own], colours)
         return light, owners
 
     def _met(
         self, places: NDArray[np.floating], directions: Floats
-    ) -> tuple[Numbers, Floats, Floats]:
-        """Numbers (n,) of the first solids on rays, ways (n,) to them, normals (n, 3) there."""
+    ) -> tuple[Numbers, Floats, Floats, Numbers]:
+        """Numbers (n,) of the first solids on rays, ways (n,) to them, normals (n, 3) and triangles
+        (n,) there.
+        """
         ways = self.stage.ground.ways(directions)
         owners, normals = np.full(len(places), NOBODY), np.zeros_like(directions)
+        faces = np.zeros(len(places), dtype=np.intp)
         for number, (solid, window) in enumerate(zip(self.placed, self.windows)):
             near = np.flatnonzero(_within(places, window))
             met = solid.meet(self.stage.view.eye, directions[near])
             nearer = met.ways < ways[near[met.rays]]
             first = near[met.rays[nearer]]
             owners[first], ways[first] = number, met.ways[nearer]
-            normals[first] = met.normals[nearer]
-        return owners, ways, normals
+            normals[first], faces[first] = met.normals[nearer], met.faces[nearer]
+        return owners, ways, normals, faces
 
-    def _shaded(self, number: int, points: Floats, normals: Floats, directions: Floats) -> Floats:
+    def _shaded(
+        self, number: int, points: Floats, normals: Floats, directions: Floats, colours: Floats
+    ) -> Floats:
         sun = self.stage.sun
         direct = np.maximum(normals @ sun, 0.0) * self._sunny(number, points, normals)
         upwards = 0.5 + 0.5 * normals[:, 2:]
@@ -115,7 +121,7 @@ class _Moment:
         halfway = unit(sun - unit(directions))
         gleam = np.maximum(np.einsum("ij,ij->i", normals, halfway), 0.0) ** SHARPNESS
         gleam *= SHEEN * (direct > 0.0)
-        diffuse = self.stage.colours[number] * (direct[:, None] * SUNLIGHT + around)
+        diffuse = colours * (direct[:, None] * SUNLIGHT + around)
         return (diffuse + gleam[:, None] * SUNLIGHT).astype(np.float32)
 
     def _sunny(self, number: int, points: Floats, normals: Floats) -> Flags:
@@ -127,6 +133,13 @@ class _Moment:
                 starts = points[left] + LIFT * solid.surface.radius * normals[left]
                 sunny[left] = ~other.hides(starts, np.broadcast_to(sun, starts.shape))
         return sunny
+
+
+def _paint(surface: Appearance) -> Floats:
+    """Light (F, 3) of each triangle's colour."""
+    if surface.painted is None:
+        return np.tile(linear_light(surface.colour).astype(np.float32), (len(surface.faces), 1))
+    return np.array([linear_light(each) for each in surface.colours], np.float32)[surface.painted]
 
 
 def _centres(pixels: tuple[Numbers, ...]) -> NDArray[np.float64]:

@@ -74,12 +74,13 @@ class Meetings(NamedTuple):
     """First intersections with a surface of those rays that meet it, by their numbers (m,).
 
     `ways` (m,) are distances, in lengths of the rays' directions; `normals` (m, 3) are unit vectors
-    on the rays' side, smooth but for creases.
+    on the rays' side, smooth but for creases, and `faces` (m,) the triangles.
     """
 
     rays: NDArray[np.intp]
     ways: Floats
     normals: Floats
+    faces: NDArray[np.integer]
 
 
 class RayedSurface:
@@ -110,7 +111,7 @@ class RayedSurface:
         inside = np.einsum("ij,ij->i", outwards, directions[rays]) > 0.0
         normals[inside] *= -1.0
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return Meetings(rays, hits["tfar"][rays], normals)
+        return Meetings(rays, hits["tfar"][rays], normals, faces)
 
     def hides(self, origins: Floats, directions: Floats) -> Flags:
         """Which rays (n,) hit the surface."""

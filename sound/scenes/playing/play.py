@@ -64,9 +64,7 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
         course,
         impacts,
         contacts,
-        sustained_forces(
-            contacts, bodies, ground.material, seconds, engine, settings.rate, scene.seed, threads
-        ),
+        sustained_forces(contacts, seconds, engine, settings.rate, scene.seed, threads),
         gains_of(bodies, settings.radiation, threads),
         head_of(scene.listener, camera),
         settings,
@@ -82,8 +80,12 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     ]
     clock.lap("voices")
     surfaces = [
-        Appearance(
-            each.entry.name, each.shape.vertices, each.shape.faces, each.entry.made_of.colour
+        Appearance.of_regions(
+            each.entry.name,
+            each.shape.vertices,
+            each.shape.faces,
+            [material.colour for material in each.materials],
+            each.which,
         )
         for each in bodies
     ]

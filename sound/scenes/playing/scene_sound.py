@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.composition.materials import NamedMaterial
 from carillon.processes.threads import in_parallel
 from sound.scenes.audible.contact_damping import rests_of
 from sound.scenes.audible.excitation import excitation
@@ -16,7 +15,6 @@ from sound.scenes.audible.sustained_contact import SustainedForce, sustained_for
 from sound.scenes.bodies import Body
 from sound.scenes.contact.engine import Course
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact
-from sound.scenes.performance import GROUND
 from sound.scenes.scene import EngineEntry, SoundEntry
 from sound.synthesis.driven import ring
 
@@ -109,8 +107,6 @@ class SceneSound:
 
 def sustained_forces(
     contacts: Sequence[SustainedContact],
-    bodies: Sequence[Body],
-    ground: NamedMaterial,
     seconds: float,
     engine: EngineEntry,
     rate: int,
@@ -118,17 +114,7 @@ def sustained_forces(
     threads: int,
 ) -> list[SustainedForce]:
     """The sustained forces of all pairs; `sustained_force` describes the parameters."""
-
-    def roughness(pair: tuple[int, int]) -> float:
-        one, other = (
-            ground.roughness if each == GROUND else bodies[each].entry.made_of.roughness
-            for each in pair
-        )
-        return float(np.hypot(one, other))
-
-    tasks = [
-        (each, roughness(each.pair), seconds, engine.step_seconds, rate, seed) for each in contacts
-    ]
+    tasks = [(each, seconds, engine.step_seconds, rate, seed) for each in contacts]
     return [each for each in in_parallel(sustained_force, tasks, threads) if each is not None]
 
 

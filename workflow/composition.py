@@ -1,0 +1,50 @@
+"""What the models of a run are made of, and what holds them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from carillon.arrays import Surface
+from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.composition.entries import (
+    CompositionEntry,
+    SupportEntry,
+    describes_regions,
+    joined_surface,
+    read_composition,
+)
+from carillon.fem.geometry import load_surface
+from workflow.arguments import path_word
+from workflow.settings import described_by, mesh_of
+
+Config = Mapping[str, Any]
+
+
+def composition_of(config: Config, model: str) -> CompositionEntry:
+    """Regions of a model, and all that holds it.
+
+    Raises UserError if its file is of no use.
+    """
+    file = described_by(config, model)
+    entry = CompositionEntry() if file is None else read_composition(file)
+    held = (SupportEntry(where=place) for place in config["models"][model]["fix"] or ())
+    return CompositionEntry(regions=entry.regions, supports=(*entry.supports, *held))
+
+
+def surface_of(config: Config, model: str) -> Surface:
+    """Triangles [m] around a model."""
+    mesh = mesh_of(config, model)
+    if describes_regions(mesh):
+        return joined_surface(read_composition(mesh), mesh)
+    return load_surface(mesh, config["models"][model]["unit"])
+
+
+def files_of(regions: str) -> list[str]:
+    """Files that a file of regions names.
+
+    Raises UserError if it is of no use.
+    """
+    entries = read_composition(regions).regions
+    named = [name for each in entries for name in (each.mesh, each.labels) if name]
+    inside = [name for name in named if not name.startswith(BUILTIN_PREFIX)]
+    return list(dict.fromkeys(path_word(Path(regions).parent / name) for name in inside))
