@@ -48,10 +48,13 @@ def parts_of(material):
     ]
 
 
-def simulation(kind, material="brass", supports=(), free=NOTHING, level=False, tolerance=1e-13):
-    """A block of two regions whose border is oblique."""
+def simulation(
+    kind, material="brass", supports=(), free=NOTHING, level=False, tolerance=1e-13, more=()
+):
+    """A block of two regions whose border is oblique, or of more."""
     surface = surface_of_block()
-    composition = Composition(parts_of(material), "block", ClosedSurface(surface))
+    parts = [*parts_of(material), *more]
+    composition = Composition(parts, "block", ClosedSurface(surface))
     cells = None
     if kind == "finite-cell":
         cells = finite_cells(surface, 6)
@@ -134,18 +137,28 @@ def free(density=True, poisson=True):
 
 
 CLAMP = Support("clamp", Expression("x < 0.001"))
-HINGE = Support("hinge", Expression("x < 0.0001 and z < 0.0001"))
+HINGE = (Support("one", None, (0.0, 0.0, 0.0)), Support("other", None, (0.0, 0.06, 0.0)))
 MASS = Support("mass", None, (0.07, 0.03, 0.04), mass=0.2)
 SPRING = Support("spring", None, (0.01, 0.03, 0.0), spring=np.array(3e7))
 
 
-@pytest.mark.parametrize("supports", [(), (CLAMP,), (HINGE,)])
+@pytest.mark.parametrize("supports", [(), (CLAMP,), HINGE])
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_two_regions(kind, supports):
     solid = simulation(kind, supports=supports, free=free())
-    assert solid.model.rigid_modes == {(): 6, (CLAMP,): 0, (HINGE,): 1}[supports]
+    assert solid.model.rigid_modes == {(): 6, (CLAMP,): 0, HINGE: 1}[supports]
     z = 0.3 * np.random.default_rng(1).standard_normal(solid.material.dimensions)
     assert_derivatives(solid, z, kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shares_of_three_regions_that_meet_add_up(kind):
+    """Some finite cells hold all three."""
+    glass = named_material("glass").region("third")
+    solid = simulation(kind, more=[MaterialRegion(glass, Expression("z > 0.0217"))])
+    evaluation = solid.evaluate(0.3 * np.random.default_rng(7).standard_normal(SIZE))
+    whole = np.zeros(len(solid.material.basis), dtype=int)
+    np.testing.assert_allclose(solid.energy_shares(evaluation, whole), 1.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["voxel", "finite-cell"])
@@ -165,7 +178,7 @@ def test_derivatives_of_a_solid_with_springs_and_masses(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_all_pairs_are_the_same_ones(kind):
     """Those of the reduced model, whose modes may mix."""
-    solid = simulation(kind, supports=(HINGE,), free=free(), tolerance=1e-11)
+    solid = simulation(kind, supports=HINGE, free=free(), tolerance=1e-11)
     z = 0.3 * np.random.default_rng(4).standard_normal(solid.material.dimensions)
     evaluation = solid.evaluate(z)
     few, all_ = (solid.differentiate(evaluation, whole) for whole in (False, True))

@@ -114,6 +114,9 @@ def _tensor_compliance(matrix: Array) -> Array:
 def orthotropic_matrix(young: Array, shear: Array, poisson: Array) -> Array:
     """Elasticity matrix (6, 6) [Pa] of three planes of symmetry, across x, y and z.
 
+    Raises UserError if no material has these constants: the strain energy of some strain would be
+    negative.
+
     Parameters
     ----------
     young
@@ -123,9 +126,6 @@ def orthotropic_matrix(young: Array, shear: Array, poisson: Array) -> Array:
     poisson
         (3,) Poisson's ratios nu_xy, nu_yz, nu_zx: nu_ab is minus the strain along b over that along
         a under a stress along a.
-
-    Raises UserError if no material has these constants: the strain energy of some strain would be
-    negative.
 
     Examples
     --------

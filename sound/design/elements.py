@@ -222,7 +222,8 @@ class _CellElements(AnalysedElements):
         there = elements.shares.any(axis=2)
         if elements.kinks is not None:
             self._add_kinks(elements.kinks.borders, elements.law)
-            there[elements.kinks.borders.cell] = False
+            for part, slot in zip(self.parts, self._slots, strict=True):
+                there[part.cells, slot] = False
         for number in np.unique(elements.law):
             cell, slot = np.nonzero(there & (elements.law == number))
             if len(cell):

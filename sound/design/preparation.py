@@ -36,6 +36,10 @@ from sound.project.project import Project
 from sound.project.settings import MaterialSettings
 from sound.strikes import Strike
 
+STIFFER = 10.0
+"""Stiffness of what holds the solid of a search, over that for the moduli that it starts from: a
+design may raise them."""
+
 
 @dataclass(frozen=True)
 class DesignProblem:
@@ -133,8 +137,8 @@ def prepared_solid(
     )
     supports = None
     if composed.supports:
-        nominal = reduced.moduli(np.zeros(reduced.dimensions))
-        finest = fine_model(mesh, nominal) if finite is None else finite_cell_model(finite, nominal)
+        stiff = STIFFER * reduced.moduli(np.zeros(reduced.dimensions))
+        finest = fine_model(mesh, stiff) if finite is None else finite_cell_model(finite, stiff)
         supports = placed_supports(composed.supports, finest, loaded.triangles, loaded.name)
     return PreparedSolid(surface, mesh, reduced, finite, placed, supports, has_scale)
 
