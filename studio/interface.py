@@ -59,6 +59,9 @@ class Studio(Protocol):
     async def surface(self, number: int) -> bytes:
         """The surface as a binary message, see `studio.binary`."""
 
+    async def composition(self, number: int) -> bytes:
+        """Where regions and supports are on the surface, as a binary message."""
+
     async def clip_sound(self, clip: str, part: str) -> bytes:
         """A clip, or a part of it (`CLIP_PARTS`), as the content of a WAV file."""
 

@@ -15,6 +15,7 @@ from carillon.parameters.documents import with_defaults
 from carillon.parameters.schema import schema_of
 from sound.project.project import Project
 from studio.binary import pack
+from studio.materials import material_table
 from studio.server.page_files import page_policy
 from tests.studio_stub import clip_entry, solid_entry, state_entry, target_entry
 
@@ -95,7 +96,9 @@ def state(**changes: Any) -> dict[str, Any]:
     return copy.deepcopy(made) | changes
 
 
-def bank(hertz: np.ndarray = NOW, number: int = 1, wanted: bool = True) -> bytes:
+def bank(
+    hertz: np.ndarray = NOW, number: int = 1, wanted: bool = True, rigid_motions: int = 6
+) -> bytes:
     """The bank of a triangle whose modes are a little off."""
     told = {
         "wanted_hertz": WANTED.tolist(),
@@ -109,6 +112,7 @@ def bank(hertz: np.ndarray = NOW, number: int = 1, wanted: bool = True) -> bytes
         "surface": 3,
         "fine": False,
         "cost": 0.4,
+        "rigid_motions": rigid_motions,
         "rms_cents": float(np.sqrt(np.mean((1200 * np.log2(hertz / WANTED)) ** 2))),
         "targets": ["rim", "handle"],
         **(told if wanted else dict.fromkeys(told)),
@@ -220,6 +224,8 @@ class Panels:
             route.fulfill(body=content, headers={"Content-Type": TYPES[Path(name).suffix]})
         elif path == "/schema.json":
             route.fulfill(json=schema_of(Project))
+        elif path == "/materials.json":
+            route.fulfill(json=material_table())
         elif path == "/clip":
             self.uploads.append(parse_qs(url.query)["name"][0])
             route.fulfill(json={"clip": f"c{9 + len(self.uploads)}"})

@@ -165,7 +165,7 @@ def served(
         finally:
             server.should_exit = True
             thread.join(SECONDS)
-            assert not thread.is_alive() and studio.closed
+            assert not thread.is_alive() and getattr(studio, "closed", True)
 
 
 def next_event(page: ClientConnection, event: str) -> dict[str, Any]:

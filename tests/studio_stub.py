@@ -23,8 +23,8 @@ from studio.binary import pack
 from studio.feed import Feed
 from studio.interface import Download, NotFoundError
 from studio.session.handlers import require_call
+from studio.session.snapshot import ELSEWHERE
 
-SIDES = {"targets", "mesh"}
 STEP_SECONDS = 0.2
 """Between two improvements of the made-up search."""
 WANTED = 523.25 * np.array([1.0, 1.5, 2.0, 2.4, 3.0, 4.0, 5.2, 6.7])
@@ -83,7 +83,10 @@ def state_entry(settings: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
         "workspace": "stub",
         "undo": None,
         "redo": None,
-        "settings": {k: v for k, v in settings.items() if k not in SIDES},
+        "settings": {k: v for k, v in settings.items() if k not in ELSEWHERE},
+        "composition": None,
+        "regions": [],
+        "supports": [],
         "search": {"phase": "idle", "message": None},
         "fine": {"on": False, "phase": "none", "message": None},
         "heard": None,
@@ -159,6 +162,7 @@ class StubStudio:
             "surface": 1,
             "fine": False,
             "cost": self._away**2,
+            "rigid_motions": 6,
             "rms_cents": float(np.sqrt(np.mean(cents**2))),
             "targets": [each["name"] for each in self._targets],
             "wanted_hertz": WANTED.tolist(),
@@ -278,6 +282,9 @@ class StubStudio:
             "triangles": ("u4", self._mesh.faces),
         }
         return pack(header, arrays)
+
+    async def composition(self, number: int) -> bytes:
+        raise NotFoundError(f"there is no composition {number} any more")
 
     def _require_clip(self, clip: str) -> None:
         if clip not in [each["clip"] for each in self._clips]:

@@ -237,7 +237,7 @@ REGIONS = """regions:
         (REGIONS + "supports: [{where: 'region:lid'}]\n", "there is no region 'lid'"),
         (REGIONS + "supports: [{where: 'x > -9'}]\n", "nothing is left that vibrates"),
         (REGIONS + "supports: [{at: [9, 9, 9]}]\n", "the nearest is"),
-        (REGIONS + "supports: [{mass: 1}]\n", "expected where or at"),
+        (REGIONS + "supports: [{mass: 1}]\n", "expected where, at or painted"),
         ("regions: [{name: a, mesh: missing.stl}]\n", "missing.stl"),
     ],
 )

@@ -45,6 +45,8 @@ def page(opened):
     page.evaluate(
         """() => {
           document.activeElement.blur();
+          // What was said before lies over the view.
+          for (const said of document.querySelectorAll("#messages button")) said.click();
           studio.view.drawing.reset();
           studio.selection.set(
             { target: "rim", vertex: null, strength: 1, tool: "strike", holding: false });

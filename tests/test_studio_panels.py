@@ -388,7 +388,7 @@ def test_the_cost_is_drawn_and_told(panels, page):
 def test_only_what_was_changed_is_sent(panels, page):
     page.get_by_label("Resolution").fill("40")
     page.get_by_label("Weight of amplitudes").fill("2.5e1")
-    page.get_by_label("Density").fill("1000")
+    page.get_by_label("Density [kg/m³]", exact=True).fill("1000")
     page.get_by_text("More settings").click()
     page.get_by_label("Bounds of the modulus, lowest").fill("1e7")
     page.get_by_label("Bounds of the modulus, highest").fill("4e11")
@@ -418,7 +418,7 @@ def test_only_what_was_changed_is_sent(panels, page):
     ],
 )
 def test_what_does_not_fit_is_refused_with_a_sentence(panels, page, label, typed, said):
-    field = page.get_by_label(label, exact=label == "Modes").first
+    field = page.locator("#panel-settings").get_by_label(label, exact=label == "Modes").first
     field.fill(typed)
     page.get_by_role("button", name="Apply").click()
     error = page.locator("#panel-settings .field-error:visible")
@@ -440,7 +440,7 @@ def test_empty_fields_and_words_are_sent_as_such(panels, page):
 def test_what_is_typed_outlives_a_new_state_and_can_be_discarded(panels, page):
     page.get_by_label("Resolution").fill("40")
     panels.change(settings=panels.state["settings"] | {"resolution": 20, "density": 7800.0})
-    expect(page.get_by_label("Density")).to_have_value("7800")
+    expect(page.get_by_label("Density [kg/m³]", exact=True)).to_have_value("7800")
     expect(page.get_by_label("Resolution")).to_have_value("40")
     page.locator("#panel-settings").get_by_role("button", name="Discard").click()
     expect(page.get_by_label("Resolution")).to_have_value("20")

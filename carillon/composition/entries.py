@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +21,7 @@ from carillon.composition.domains import (
     Labelled,
 )
 from carillon.composition.materials import NamedMaterial, named_material
+from carillon.composition.painted import Painted
 from carillon.composition.supports import Support
 from carillon.errors import UserError
 from carillon.fem.elasticity import axes_along, orthotropic_matrix
@@ -43,6 +44,11 @@ from carillon.parameters.quantities import (
 Coordinate = Annotated[float, between(-1e9, 1e9)]
 Vector = Triple[Coordinate]
 Along = Annotated[str, OneOf("x", "y", "z", "xy", "yz", "xz", "xyz")]
+Dab = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate, Coordinate],
+    "a place of the surface and the radius of the paint there [m]",
+]
+Paint = Annotated[tuple[Dab, ...], Within(min_length=1, max_length=20_000)]
 DEFAULT_YOUNG = 1e9
 """Young's modulus [Pa] of a region that names neither a material nor a modulus."""
 
@@ -92,10 +98,22 @@ class RegionEntry:
         None, "name or number of its label in that file"
     )
     unit: MetresPerUnit = option(1.0, "metres per unit of its mesh or labels [m]")
+    painted: Paint | None = option(
+        None,
+        "places of the surface, x, y, z, and the radius about each that is painted [m]: what is "
+        "nearest to that is in the region; a negative radius takes paint away, the last one counts",
+    )
+    depth: Positive | None = option(
+        None,
+        "how deep the paint goes below its side [m]; if null, through thin walls, and else to "
+        "where another side is nearer",
+    )
 
     def __post_init__(self) -> None:
-        kinds = ("where", "box", "mesh", "labels")
+        kinds = ("where", "box", "mesh", "labels", "painted")
         places = [name for name in kinds if getattr(self, name) is not None]
+        if self.depth is not None and self.painted is None:
+            raise ValueError("depth goes with painted")
         if len(places) > 1:
             raise ValueError(f"expected one place, found {' and '.join(places)}")
         if self.part is not None and places and places != ["mesh"]:
@@ -157,6 +175,8 @@ class RegionEntry:
             return ClosedSurface(self.own_surface(solid.folder))
         if self.part is not None:
             return ClosedSurface(_part(solid.mesh, self.part, solid.unit, self.name))
+        if self.painted is not None:
+            return Painted(solid.surface, self.painted, self.depth)
         return Everywhere()
 
     def own_surface(self, folder: Path) -> Surface:
@@ -191,6 +211,11 @@ class SupportEntry:
     )
     at: Vector | None = option(None, "a point of the solid [m]")
     radius: Positive | None = option(None, "distance from the point within which all is held [m]")
+    painted: Paint | None = option(
+        None,
+        "places of the surface, x, y, z, and the radius about each that is held there [m]; a "
+        "negative radius takes away, the last one counts",
+    )
     along: Along = option("xyz", "axes along which it acts")
     spring: NonNegative | None = option(
         None,
@@ -202,8 +227,8 @@ class SupportEntry:
     mass: Positive | None = option(None, "mass that is fixed to the point [kg]")
 
     def __post_init__(self) -> None:
-        if (self.where is None) == (self.at is None):
-            raise ValueError("expected where or at")
+        if [self.where, self.at, self.painted].count(None) != 2:
+            raise ValueError("expected where, at or painted")
         if (self.pad is None) != (self.thickness is None):
             raise ValueError("pad and thickness go together")
         if self.mass is not None and (self.at is None or self.spring is not None):
@@ -215,9 +240,19 @@ class SupportEntry:
         if self.radius is not None and self.at is None:
             raise ValueError("radius goes with at")
 
-    def support(self, regions: dict[str, Domain]) -> Support:
-        """The support; raises UserError for a region or a material that there is not."""
-        label = f"support {self.where!r}" if self.at is None else f"support at {list(self.at)}"
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        if self.painted is not None:
+            x, y, z, _ = self.painted[0]
+            return f"support painted at {[x, y, z]}"
+        return f"support {self.where!r}" if self.at is None else f"support at {list(self.at)}"
+
+    def support(self, regions: Mapping[str, Domain], surface: Surface) -> Support:
+        """The support of the solid inside a surface, whose `regions` have names.
+
+        Raises UserError for a region or a material that there is not.
+        """
         axes = "x" in self.along, "y" in self.along, "z" in self.along
         pad = None
         if self.pad is not None and self.thickness is not None:
@@ -227,10 +262,12 @@ class SupportEntry:
         spring = None if self.spring is None else np.array(self.spring)
         if self.at is not None and self.radius is None:
             point = (float(self.at[0]), float(self.at[1]), float(self.at[2]))
-            return Support(label, None, point, axes, spring, self.mass or 0.0)
-        return Support(label, self._domain(regions), None, axes, spring, pad=pad)
+            return Support(self.label, None, point, axes, spring, self.mass or 0.0)
+        return Support(self.label, self._domain(regions, surface), None, axes, spring, pad=pad)
 
-    def _domain(self, regions: dict[str, Domain]) -> Domain:
+    def _domain(self, regions: Mapping[str, Domain], surface: Surface) -> Domain:
+        if self.painted is not None:
+            return Painted(surface, self.painted, depth=0.0)
         if self.at is not None and self.radius is not None:
             return Ball(np.array(self.at, dtype=float), self.radius)
         assert self.where is not None
@@ -354,7 +391,7 @@ def compose(
         inside = ClosedSurface(solid.surface)
         composition = Composition(parts, solid.name, inside, rest is not None)
     entries = [*entry.supports, *(SupportEntry(where=where) for where in fixed)]
-    return Placed(composition, tuple(each.support(domains) for each in entries))
+    return Placed(composition, tuple(each.support(domains, solid.surface) for each in entries))
 
 
 def joined_surface(entry: CompositionEntry, path: str) -> Surface:

@@ -13,10 +13,13 @@ import { makeCompare } from "./panels/compare.js";
 import { makeCost } from "./panels/cost.js";
 import { makeErrors } from "./panels/errors.js";
 import { makeMessages } from "./panels/messages.js";
+import { makeMaterials } from "./panels/materials.js";
 import { makeProject } from "./panels/project.js";
+import { makeRegions } from "./panels/regions.js";
 import { makeSettings } from "./panels/settings.js";
 import { makeShortcuts } from "./panels/shortcuts.js";
 import { makeSpectrum } from "./panels/spectrum.js";
+import { makeSupports } from "./panels/supports.js";
 import { makeTargets } from "./panels/targets.js";
 import { makeTour } from "./panels/tour.js";
 import { makeSolid } from "./solid/solid.js";
@@ -34,6 +37,7 @@ import { Selection, ServerState } from "./state.js";
  * @property {ServerState} state
  * @property {Selection} selection
  * @property {Keys} keys
+ * @property {import("./panels/materials.js").Materials} materials
  * @property {(text: string, kind?: "note" | "error") => void} say
  * @property {import("./sound/bank.js").Bank} bank
  * @property {import("./sound/noise.js").Noise} noise
@@ -46,6 +50,8 @@ import { Selection, ServerState } from "./state.js";
 
 /** What is made in the body of `#panel-NAME`. */
 const PANELS = {
+  regions: makeRegions,
+  supports: makeSupports,
   targets: makeTargets,
   clip: makeClip,
   spectrum: makeSpectrum,
@@ -68,6 +74,7 @@ function main() {
   const state = new ServerState(connection);
   const selection = new Selection();
   selection.follow(state);
+  selection.followRows(state);
   const bank = makeBank({ connection });
   /** @type {Parts} */
   const parts = {
@@ -75,6 +82,7 @@ function main() {
     state,
     selection,
     keys: new Keys(),
+    materials: makeMaterials({ connection }),
     say: (text, kind = "note") => connection.listeners.tell("event said", { text, kind }),
     bank,
     player: makePlayer({ bank }),

@@ -4,6 +4,7 @@
 
 /** @typedef {import("./types.js").State} State */
 /** @typedef {import("./connection.js").Connection} Connection */
+/** @typedef {{kind: import("./types.js").RowKind, number: number}} RowChoice */
 
 /**
  * A value and who wants to know of its changes.
@@ -66,21 +67,38 @@ export class ServerState extends Observed {
  *
  * `target` is the name of the selected target; `mode` the number of the mode under the pointer, from 0;
  * `vertex` was struck last; `strength` is that of a strike, 0 to 1; `tool` is what a click on the solid
- * does; `holding` says that a strike is the stronger the longer the pointer was down.
+ * does: strike it, place a target, paint the selected row, or place that on a point; `holding` says that a strike is the stronger the longer the pointer was down.
  *
  * @typedef {object} Choices
  * @property {string | null} target
  * @property {number | null} mode
  * @property {number | null} vertex
  * @property {number} strength
- * @property {"strike" | "place"} tool
+ * @property {"strike" | "place" | "paint" | "point"} tool
  * @property {boolean} holding
+ * @property {RowChoice | null} row the region or support that is selected
+ * @property {Record<string, unknown> | null} pending keys that a support gets with its point
+ * @property {number} brush radius, in longest sides of the solid
+ * @property {boolean} erasing whether the brush takes paint away
+ * @property {"modulus" | "regions"} colouring what the solid's colours stand for
  */
 
 /** @extends {Observed<Choices>} */
 export class Selection extends Observed {
   constructor() {
-    super({ target: null, mode: null, vertex: null, strength: 1, tool: "strike", holding: false });
+    super({
+      target: null,
+      mode: null,
+      vertex: null,
+      strength: 1,
+      tool: "strike",
+      holding: false,
+      row: null,
+      pending: null,
+      brush: 0.06,
+      erasing: false,
+      colouring: "modulus",
+    });
   }
 
   /** @param {Partial<Choices>} changes */
@@ -100,6 +118,25 @@ export class Selection extends Observed {
     this.functions.add(wanted);
     wanted(this.current, this.current);
     return () => this.functions.delete(wanted);
+  }
+
+  /**
+   * Keeps to rows that there are, and to tools that do something with the selected one.
+   *
+   * @param {ServerState} state
+   */
+  followRows(state) {
+    state.onChange((now, before) => {
+      const { row, tool, colouring } = this.current;
+      const chosen = row === null ? undefined : now[row.kind][row.number];
+      if (row !== null && !chosen) this.set({ row: null, pending: null });
+      const painted = chosen !== undefined && chosen.dabs !== null;
+      if ((tool === "paint" && !painted) || (tool === "point" && !chosen)) this.set({ tool: "strike" });
+      const rows = now.regions.length + now.supports.length;
+      const fewer = before === null || rows > before.regions.length + before.supports.length;
+      if (rows > 0 && fewer) this.set({ colouring: "regions" });
+      if (rows === 0 && colouring === "regions") this.set({ colouring: "modulus" });
+    });
   }
 
   /**

@@ -32,6 +32,66 @@ export interface Target {
   without: number[];
 }
 
+export type Vector = [number, number, number];
+
+/** A material by its name, as `/materials.json` lists it. */
+export interface NamedMaterial {
+  name: string;
+  about: string;
+  /** [Pa], [1], [kg/m^3]; those of a wood are along its grain. */
+  young: number;
+  poisson: number;
+  density: number;
+  /** At 1 kHz. */
+  loss_factor: number;
+  colour: Vector;
+  wood: boolean;
+  grain_young: Vector | null;
+}
+
+/** What regions and supports have in common. */
+export interface Placed {
+  where?: string;
+  /** How many places are painted; null if it is not placed by paint. */
+  dabs: number | null;
+  /** What is wrong with it. */
+  fault: string | null;
+}
+
+/** A region of the solid: keys that it has in a project, but paint. */
+export interface Region extends Placed {
+  name: string;
+  material?: string;
+  young?: number;
+  poisson?: number;
+  density?: number;
+  loss_factor?: number;
+  grain_young?: Vector;
+  grain?: Vector;
+  radial?: Vector;
+  pith?: Vector;
+  box?: [Vector, Vector];
+  mesh?: string;
+  part?: string;
+  labels?: string;
+  label?: string;
+  unit?: number;
+  depth?: number;
+}
+
+/** What holds the solid somewhere: keys that it has in a project, but paint. */
+export interface Support extends Placed {
+  at?: Vector;
+  radius?: number;
+  along?: string;
+  spring?: number;
+  pad?: string;
+  thickness?: number;
+  mass?: number;
+}
+
+export type RowKind = "regions" | "supports";
+
 export interface SolidState {
   mesh: string;
   name: string;
@@ -69,6 +129,10 @@ export interface State {
   clips: Clip[];
   wanted: Wanted | null;
   settings: { [key: string]: any };
+  /** Number of what `/composition/N` tells of regions and supports. */
+  composition: number | null;
+  regions: Region[];
+  supports: Support[];
   search: { phase: "idle" | "starting" | "running"; message: string | null };
   fine: { on: boolean; phase: "none" | "working" | "ready"; message: string | null };
   /** Which of two materials the present one is; `null` while there is no other one to swap with. */
@@ -102,6 +166,8 @@ export interface BankHeader {
   fine: boolean;
   cost: number | null;
   rms_cents: number | null;
+  /** Motions of the solid as a whole that nothing resists: 6 of a free one. */
+  rigid_motions?: number;
   targets: string[];
   wanted_hertz: number[] | null;
   cents: number[] | null;
@@ -121,6 +187,14 @@ export interface BankArrays {
   young: Float32Array;
   /** (T, N) [full scale per N s] */
   struck: Float64Array;
+}
+
+/** Arrays of the binary answer to `/composition/N`: V vertices of the surface, 65535 of no row. */
+export interface CompositionArrays {
+  /** (V) number of the region */
+  region: Uint16Array;
+  /** (V) number of the support, of those that are not at a point alone */
+  support: Uint16Array;
 }
 
 /** Header of the binary answer to `/surface/N`. */

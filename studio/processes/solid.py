@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from carillon.arrays import Array
+from carillon.composition.entries import CompositionEntry
 from carillon.fem.model import Solid
 from carillon.processes.threads import one_thread
 from solver.analysis.modes import Modes
@@ -42,6 +43,7 @@ from sound.strikes import Place, Strike, locate_all, longest_side, struck_surfac
 from studio.binary import pack
 from studio.processes.bank import Aim, Heard, bank
 from studio.processes.search import history_of
+from studio.rows import KINDS
 
 MODES = 30
 """Elastic modes of a solid that has no targets yet."""
@@ -85,9 +87,11 @@ class SolidProcess:
         )
         return SurfaceNews(message, len(positions), len(faces), longest_side(surface))
 
-    def prepare(self, solid: ProblemOptions, material: MaterialSettings) -> dict[str, int]:
+    def prepare(
+        self, solid: ProblemOptions, material: MaterialSettings, composition: CompositionEntry
+    ) -> dict[str, int]:
         """Voxels, material and modes of the solid whose surface was read; how many of them."""
-        self._prepared = prepared_solid(solid, material, self._surface)
+        self._prepared = prepared_solid(solid, material, self._surface, composition)
         self._solid, self._problem = solid, None
         self._own = self._fine = None
         return {"voxels": self._prepared.mesh.n_cells, "unknowns": self._sounding().model.n_dofs}
@@ -115,7 +119,7 @@ class SolidProcess:
         return pickle.dumps(self._problem)
 
     def is_of_targets(self, design: str) -> bool:
-        """Whether a design in a file was made for the present targets."""
+        """Whether a design in a file was made for the present targets, regions and supports."""
         return self._is_of_targets(read_design(design))
 
     def design(
@@ -172,8 +176,8 @@ class SolidProcess:
             sounding.pushed(made.model, made.elastic_modes, self._inward),
             self._at_vertices(made.young),
         )
-        cost = {"cost": made.evidence.get("cost")}
-        return bank(heard, self._positions, self._aimed(), {**cost, **header})
+        told = {"cost": made.evidence.get("cost"), "rigid_motions": made.model.rigid_modes}
+        return bank(heard, self._positions, self._aimed(), {**told, **header})
 
     def fine_bank_of(self, design: str, header: dict[str, Any]) -> bytes:
         """The bank of a design's material on the solid that the coarse one stands for."""
@@ -182,7 +186,9 @@ class SolidProcess:
     def _is_of_targets(self, design: Design) -> bool:
         if self._problem is None:
             return False
-        targets = self._problem.setting.objective.targets
+        own, targets = self._problem.project.as_dict(), self._problem.setting.objective.targets
+        if any((design.settings.get(kind) or []) != own[kind] for kind in KINDS):
+            return False
         return design.targets.names == targets.names and np.array_equal(
             design.targets.frequencies, targets.frequencies
         )
@@ -213,13 +219,15 @@ class SolidProcess:
             dampings = Damping().decay_per_second(evaluation.eigenvalues)
         else:
             assert self._problem is not None
-            stretch = common_factor(np.sort(own), aim.targets.frequencies)
-            own, young = stretch * own, stretch**2 * young
             objective = self._problem.setting.objective
+            if not objective.absolute:
+                stretch = common_factor(np.sort(own), aim.targets.frequencies)
+                own, young = stretch * own, stretch**2 * young
             keys.setdefault("cost", cost_of(objective, material, evaluation).total)
         pushed = sounding.pushed(sounding.model, elastic, self._inward)
         heard = Heard(own, dampings, pushed, self._at_vertices(young))
-        return bank(heard, self._positions, aim, {"cost": None, **keys})
+        told = {"cost": None, "rigid_motions": sounding.model.rigid_modes}
+        return bank(heard, self._positions, aim, {**told, **keys})
 
     @property
     def _positions(self) -> Array:
@@ -248,7 +256,7 @@ class SolidProcess:
         parts = self._prepared
         anywhere = Strike("", 0, self._positions[0], self._inward[0])
         nothing: Any = None
-        return Setting(parts.mesh, self._solid, parts.material, [anywhere], nothing, parts.cells)
+        return parts.setting(self._solid, [anywhere], nothing)
 
     def _simulation(self, setting: Setting, tolerance: float = TOLERANCE) -> Simulation:
         with one_thread():

@@ -15,6 +15,7 @@ from carillon.errors import UserError
 from carillon.parameters.schema import schema_of
 from sound.project.project import Project
 from studio.interface import CLIP_PARTS, EXPORTS, NotFoundError, Studio
+from studio.materials import material_table
 from studio.server.guard import Guard, Keys, fault
 from studio.server.page_files import page_table, send_file, send_page
 from studio.server.socket import OWN_FAULT, sentence_of, talk
@@ -51,9 +52,11 @@ def make_app(
             Route("/", routes.page, methods=["GET"]),
             Route("/page/{rest:path}", routes.file, methods=["GET"]),
             Route("/schema.json", routes.schema, methods=["GET"]),
+            Route("/materials.json", routes.materials, methods=["GET"]),
             Route("/mesh", routes.mesh, methods=["POST"]),
             Route("/clip", routes.clip, methods=["POST"]),
             Route("/surface/{number}", routes.surface, methods=["GET"]),
+            Route("/composition/{number}", routes.composition, methods=["GET"]),
             Route("/clip/{clip}/spectrum", routes.spectrum, methods=["GET"]),
             Route("/clip/{clip}/{part}", routes.sound, methods=["GET"]),
             Route("/export/{kind}", routes.export, methods=["GET"]),
@@ -101,11 +104,15 @@ class _Routes:
             self._uploads -= 1
         return content, upload_name(request.query_params.get("name", ""), what, endings)
 
+    async def materials(self, request: Request) -> Response:
+        return JSONResponse(material_table())
+
     async def surface(self, request: Request) -> Response:
-        text = request.path_params["number"]
-        if not (text.isascii() and text.isdigit() and len(text) <= LONGEST_NUMBER):
-            raise NotFoundError(f"surface {text:.100} is no number")
-        content = await self._studio.surface(int(text))
+        content = await self._studio.surface(_number(request, "surface"))
+        return Response(content, media_type="application/octet-stream")
+
+    async def composition(self, request: Request) -> Response:
+        content = await self._studio.composition(_number(request, "composition"))
         return Response(content, media_type="application/octet-stream")
 
     async def spectrum(self, request: Request) -> Response:
@@ -129,6 +136,13 @@ class _Routes:
 
     async def socket(self, page: WebSocket) -> None:
         await talk(page, self._studio)
+
+
+def _number(request: Request, what: str) -> int:
+    text: str = request.path_params["number"]
+    if not (text.isascii() and text.isdigit() and len(text) <= LONGEST_NUMBER):
+        raise NotFoundError(f"{what} {text:.100} is no number")
+    return int(text)
 
 
 async def _refused(request: Request, error: Exception) -> Response:

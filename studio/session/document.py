@@ -10,6 +10,7 @@ from typing import Any
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
 from sound.project.project import Project, project_of
+from studio.rows import complete, rows_of
 
 NO_CLIP = "none"
 _ANYWHERE = {"name": "anywhere", "vertex": 0, "clip": NO_CLIP}
@@ -75,9 +76,9 @@ class Document:
         return replace(self, targets=tuple(each for each in targets if each is not None))
 
     def described(self) -> dict[str, Any]:
-        """The project as its file has it: targets without a clip are left out."""
+        """The project as its file has it, without targets that have no clip, and rows no place."""
         targets = [_described(target) for target in self.targets if target.clip is not None]
-        return {**self.settings, "targets": targets}
+        return {**complete(self.settings), "targets": targets}
 
     def project(self, folder: Path) -> Project:
         """The project, in a workspace's folder.
@@ -89,7 +90,7 @@ class Document:
 
     def solid(self, folder: Path) -> Project:
         """The project with a target that stands for those that it may have; errors likewise."""
-        return project_of({**self.settings, "targets": [_ANYWHERE]}, folder)
+        return project_of({**complete(self.settings), "targets": [_ANYWHERE]}, folder)
 
     def require_sound(self, folder: Path) -> Document:
         """The same, if it can be a project once every target has a clip.
@@ -98,7 +99,7 @@ class Document:
         """
         named = [replace(target, clip=target.clip or NO_CLIP) for target in self.targets]
         targets = [_described(target) for target in named] or [_ANYWHERE]
-        project_of({**self.settings, "targets": targets}, folder)
+        project_of({**complete(self.settings), "targets": targets}, folder)
         names = [target.name for target in self.targets]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
@@ -149,6 +150,8 @@ def files_of(document: Document) -> list[str]:
     """Paths of all files that a document names."""
     named = [document.mesh, document.settings.get("forest")]
     named += [target.clip for target in document.targets]
+    regions = rows_of(document.settings, "regions")
+    named += [row.get(key) for row in regions for key in ("mesh", "labels")]
     return [name for name in named if name is not None and not name.startswith(BUILTIN_PREFIX)]
 
 

@@ -13,6 +13,8 @@ from carillon.parameters.documents import require_values
 from carillon.parameters.model import Within
 from sound.project.project import Project
 from studio.interface import NotFoundError
+from studio.rows import KINDS
+from studio.session.composing import add_row, change_row, move_row, paint, remove_row
 from studio.session.document import Document, Target, merged
 from studio.session.examples import EXAMPLES
 from studio.session.projects import fit_name, opened, save
@@ -97,8 +99,8 @@ def remove_target(state: StudioState, target: Text) -> None:
 
 
 def change_settings(state: StudioState, settings: dict[str, Any]) -> None:
-    """Change keys of the project but its targets."""
-    require_values(settings, Project, leave_out=("mesh", "targets"))
+    """Change keys of the project but its targets, regions and supports."""
+    require_values(settings, Project, leave_out=("mesh", "targets", *KINDS))
     if settings.get("forest") is not None:
         state.workspace.path(settings["forest"])
     document = state.document
@@ -154,6 +156,11 @@ HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
     "add_target": add_target,
     "change_target": change_target,
     "remove_target": remove_target,
+    "add_row": add_row,
+    "change_row": change_row,
+    "remove_row": remove_row,
+    "move_row": move_row,
+    "paint": paint,
     "change_settings": change_settings,
     "optimise": StudioState.begin_search,
     "stop": StudioState.stop_search,

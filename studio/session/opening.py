@@ -125,8 +125,8 @@ def _of_design(path: Path, workspace: Workspace) -> Document:
             "mesh instead"
         ) from None
     folder = workspace.folder
-    for entry in (settings, *settings["targets"]):
-        for key in ("mesh", "forest", "clip"):
+    for entry in (settings, *settings["targets"], *settings.get("regions", ())):
+        for key in ("mesh", "forest", "clip", "labels"):
             if entry.get(key) is not None and not entry[key].startswith(BUILTIN_PREFIX):
                 entry[key] = _relative(entry[key], folder)
     document = document_of(settings)

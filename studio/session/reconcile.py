@@ -30,9 +30,11 @@ class Reconciler:
 
     def start(self) -> None:
         """Begin."""
-        self._tasks = [asyncio.ensure_future(each) for each in (self._keep_up(), self._follow())]
+        tasks = (self._keep_up(), self._place(), self._follow())
+        self._tasks = [asyncio.ensure_future(each) for each in tasks]
         self._state.solid.warm()
         self._state.woken.set()
+        self._state.placed.set()
 
     @property
     def _to_show(self) -> Any:
@@ -69,6 +71,16 @@ class Reconciler:
             except Exception:
                 logger.exception("the studio could not keep up")
                 self._state.pages.say(FAULT, "error")
+
+    async def _place(self) -> None:
+        """Tell where regions and supports are, while the solid may still be prepared."""
+        while True:
+            await self._state.placed.wait()
+            self._state.placed.clear()
+            try:
+                await self._state.placing.bring(self._state.document)
+            except UserError as error:
+                logger.info("rows could not be placed: %s", error)  # the solid tells it
 
     async def _bring(self, document: Document) -> None:
         state = self._state

@@ -7,9 +7,13 @@ from typing import Any
 from carillon.fem.geometry.builtin import BUILTINS
 from carillon.parameters.documents import with_defaults
 from sound.project.project import Project
+from studio.rows import KINDS, rows_of, told
 from studio.session.examples import EXAMPLES
 from studio.session.restoring import LONGEST_NAME, kept, restored
 from studio.session.state import StudioState
+
+ELSEWHERE = ("mesh", "targets", *KINDS)
+"""Keys of a project that pages are not told as settings."""
 
 
 def state_event(state: StudioState) -> dict[str, Any]:
@@ -31,7 +35,9 @@ def state_event(state: StudioState) -> dict[str, Any]:
         "targets": [_target(state, each.name) for each in document.targets],
         "clips": state.clips.state(),
         "wanted": state.solid.wanted,
-        "settings": {k: v for k, v in settings.items() if k not in ("mesh", "targets")},
+        "settings": {k: v for k, v in settings.items() if k not in ELSEWHERE},
+        "composition": state.placing.number,
+        **{kind: _rows(state, kind) for kind in KINDS},
         "search": {
             "phase": phase,
             "message": state.message,
@@ -62,6 +68,16 @@ def _target(state: StudioState, name: str) -> dict[str, Any]:
         "allow_clipped": target.allow_clipped,
         "without": list(target.without),
     }
+
+
+def _rows(state: StudioState, kind: str) -> list[dict[str, Any]]:
+    """Regions or supports, each with what is wrong with it."""
+    news, faults = state.solid.news, state.placing.faults
+    sentence = None if news is None else news.message
+    rows = rows_of(state.document.settings, kind)
+    return [
+        told(row, kind, faults.get((kind, number)), sentence) for number, row in enumerate(rows)
+    ]
 
 
 def session_of(state: StudioState) -> dict[str, Any]:

@@ -95,7 +95,7 @@ class SolidClient:
             project = document.solid(self._folder)
             solid, material = project.solid, project.material
             await self._bring_surface(document.mesh, solid.mesh, solid.unit)
-            await self._bring_voxels(solid, material)
+            await self._bring_voxels(solid, material, project.composition)
         except UserError as error:
             self._tell(phase="failed", message=str(error), progress=None)
             self._prepared = self._aimed = None
@@ -123,14 +123,14 @@ class SolidClient:
             longest_side_m=result.longest_side_m,
         )
 
-    async def _bring_voxels(self, solid: Any, material: Any) -> None:
-        if self._prepared == (solid, material):
+    async def _bring_voxels(self, *prepared: Any) -> None:
+        if self._prepared == prepared:
             return
         self._aimed = self._placed = None
         self.project = self.wanted = None
         self._tell(phase="preparing", message=None)
-        result = await self._worker.call("prepare", solid, material, seconds=PREPARED_SECONDS)
-        self._prepared = (solid, material)
+        result = await self._worker.call("prepare", *prepared, seconds=PREPARED_SECONDS)
+        self._prepared = prepared
         self._tell(phase="ready", message=None, progress=None, **result)
 
     async def _bring_strikes(self, document: Document) -> None:

@@ -9,6 +9,7 @@ from carillon.errors import UserError
 from studio.feed import Pages
 from studio.session.document import Document, History
 from studio.session.listening import Clips
+from studio.session.placing import Placing
 from studio.session.restoring import Autosave
 from studio.session.searching import Live, Searching
 from studio.session.solid_client import SolidClient
@@ -20,7 +21,14 @@ Told = Callable[["StudioState"], dict[str, Any]]
 """Function that describes a state: to pages, or for the file of the session."""
 _OF_VOXELS = ("mesh", "unit", "resolution", "fill", "components", "discretisation")
 """Keys of a project whose change makes other voxels, for which no former material is one."""
-_OF_COORDINATES = ("dimensions", "law", "poisson_bounds")
+_OF_COORDINATES = (
+    "dimensions",
+    "law",
+    "poisson_bounds",
+    "poisson_regions",
+    "density_bounds",
+    "density_regions",
+)
 """Keys of its material whose change makes coordinates mean something else."""
 
 
@@ -37,7 +45,7 @@ class StudioState:
     history, saved, meshes
         The document, with undo and redo, and as it was saved last; files of uploaded meshes by
         identifier.
-    solid, clips, search, live
+    solid, placing, clips, search, live
         What computes, and the newest material of a search that goes on.
     shows_fine, fine_phase
         Whether the fine solid is to be shown; `none`, `working` or `ready`.
@@ -46,8 +54,9 @@ class StudioState:
         found; why there is no search, if there was to be one.
     revision
         Number of changes that pages were told.
-    woken, improved
-        Set when the document has changed, and when `live` has.
+    woken, placed, improved
+        Set when the document has changed, for what computes and for what places rows, and when
+        `live` has.
     """
 
     def __init__(
@@ -62,10 +71,11 @@ class StudioState:
         self.message: str | None = None
         self.live: Live | None = None
         self.revision = 0
-        self.woken, self.improved = asyncio.Event(), asyncio.Event()
+        self.woken, self.placed, self.improved = (asyncio.Event() for _ in range(3))
         self.pages = Pages(lambda: event(self), self._history_event)
         self.autosave = Autosave(lambda: session(self), workspace.write_session)
         self.solid = SolidClient(workspace.folder, self.changed)
+        self.placing = Placing(workspace.folder, self.changed)
         self.clips = Clips(workspace.path, self.changed_and_woken)
         self.search = Searching(self._progressed, self._found)
         self._phase = self.search.phase
@@ -88,6 +98,7 @@ class StudioState:
         """Tell all pages the state, and bring solid, clips and search to the document."""
         self.changed()
         self.woken.set()
+        self.placed.set()
 
     def _history_event(self) -> dict[str, Any]:
         return {"event": "history", "rows": self.search.rows}

@@ -78,6 +78,13 @@ class DesignStudio:
             raise NotFoundError(f"there is no surface {number} any more; load the page anew")
         return surface[1]
 
+    async def composition(self, number: int) -> bytes:
+        """Regions and supports on the surface, if they still are those."""
+        message = self.session.placing.message
+        if message is None or self.session.placing.number != number:
+            raise NotFoundError(f"there is no composition {number} any more; load the page anew")
+        return message
+
     async def export(self, kind: str, target: str | None) -> Download:
         """The design in another form."""
         design = await designed(self.session)
@@ -98,7 +105,7 @@ class DesignStudio:
         state.autosave.save()
         await self.reconciler.end()
         state.workspace.forget_designs(state.history.designs())
-        for each in (state.solid, state.clips, state.search, self._exports):
+        for each in (state.solid, state.placing, state.clips, state.search, self._exports):
             each.end()
         state.pages.close()
         state.workspace.close()

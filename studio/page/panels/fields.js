@@ -41,13 +41,14 @@ const NAMES = {
 };
 
 /**
- * Whether a page may show a setting: files are the server's own.
+ * Whether a page may show a setting: files are the server's own, and names of regions have no field.
  *
  * @param {Schema} schema
  */
 export function isShown(schema) {
   const kinds = typesOf(schema);
-  return Boolean(schema.enum || schema.pattern) || !kinds.includes("string");
+  const ofItems = schema.items ? typesOf(schema.items) : [];
+  return Boolean(schema.enum || schema.pattern) || ![...kinds, ...ofItems].includes("string");
 }
 
 /**

@@ -18,8 +18,10 @@ const IMPORTANT = [
   "weights.amplitude",
   "weights.regulariser",
 ];
+/** What regions tell instead, where there are any. */
+const TOLD_BY_REGIONS = ["density", "poisson", "material.young"];
 /** What the page sets elsewhere. */
-const ELSEWHERE = ["mesh", "targets"];
+const ELSEWHERE = ["mesh", "targets", "regions", "supports"];
 
 /** @type {Record<string, string>} */
 const SECTIONS = {
@@ -112,7 +114,9 @@ export function makeSettings(element, parts) {
   }
 
   function show() {
+    const hasRegions = (state.current?.regions.length ?? 0) > 0;
     for (const field of fields) {
+      field.element.hidden = hasRegions && TOLD_BY_REGIONS.includes(field.path.join("."));
       const isEdited = edited.has(field.path.join("."));
       if (!isEdited) field.write(valueAt(state.current?.settings, field.path));
       field.mark(isEdited);
@@ -170,7 +174,7 @@ export function makeSettings(element, parts) {
   }
 
   state.onChange((now, before) => {
-    if (!before || now.settings !== before.settings) show();
+    if (!before || now.settings !== before.settings || now.regions !== before.regions) show();
   });
   show();
   void load();

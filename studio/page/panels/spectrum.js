@@ -65,7 +65,7 @@ export function makeSpectrum(element, parts) {
     none.hidden = pairs.length > 0;
     body.hidden = pairs.length === 0;
     if (pairs.length === 0) return;
-    setText(caption, `At ${name}; levels below the loudest mode there.`);
+    setText(caption, `At ${name}; levels below the loudest mode there. ${freedomOf(bank?.[0].rigid_motions)}`);
     const hertz = [...new Set([...pairs.map((pair) => pair.hertz), ...pairs.flatMap(wantedHertz)])];
     hertz.sort((one, other) => one - other);
     plot ??= create();
@@ -188,4 +188,12 @@ function wantedHertz(pair) {
 /** @param {number[]} hertz */
 function range(hertz) {
   return `${withHertz(Math.min(...hertz))} to ${withHertz(Math.max(...hertz))}`;
+}
+
+/** @param {number | undefined} rigid motions of the solid as a whole that nothing resists @returns {string} */
+function freedomOf(rigid) {
+  if (rigid === undefined) return "";
+  if (rigid === 0) return "Held: no rigid motion is left.";
+  const left = rigid === 6 ? "Free: all 6 rigid motions are left" : `Partly held: ${rigid} rigid motion${rigid > 1 ? "s" : ""} of 6 left`;
+  return `${left}, which do not sound.`;
 }

@@ -1,5 +1,5 @@
 /**
- * What the pointer and keys do on the solid: strike, place a target, choose one, turn.
+ * What the pointer and keys do on the solid: strike, place a target, choose one, paint, turn.
  *
  * A press on the solid strikes at once; one beside it, with the right button or with two fingers turns.
  */
@@ -16,6 +16,16 @@ import * as THREE from "three";
  * @property {(vertex: number) => void} place
  * @property {(name: string) => void} choose
  * @property {(vertex: number | null) => void} hover
+ * @property {Painting} [painting] where regions and supports are edited
+ */
+
+/**
+ * @typedef {object} Painting
+ * @property {import("./brush.js").Brush} brush
+ * @property {() => number} radius of the brush [m], negative if it takes paint away
+ * @property {(dab: import("./composition.js").Dab, vertex: number) => void} dab a place of a stroke
+ * @property {(dabs: import("./composition.js").Dab[]) => void} paint a stroke that has ended; none if it was given up
+ * @property {(point: THREE.Vector3) => void} point where a support is placed
  */
 
 // As long as this was pressed, a strike is as strong as it can be.
@@ -44,6 +54,7 @@ export class Gestures {
   constructor(view, marks, selection, gauge, deeds) {
     this.view = view;
     this.marks = marks;
+    this.painting = deeds.painting;
     this.selection = selection;
     this.gauge = gauge;
     this.deeds = deeds;
@@ -64,18 +75,24 @@ export class Gestures {
 
   /** @returns {boolean} whether something was under way that now is not */
   cancel() {
-    const busy = this.held !== null || this.placing !== null;
+    const busy = this.held !== null || this.placing !== null || this.#painting;
     this.#cancel();
     return busy;
   }
 
+  /** @returns {boolean} whether a stroke goes on */
+  get #painting() {
+    return (this.painting?.brush.stroke ?? null) !== null;
+  }
+
   /** @param {PointerEvent} event */
   #down(event) {
-    if (this.held || this.placing) this.#cancel(); // a second finger: it turns, and nothing else
+    if (this.held || this.placing || this.#painting) this.#cancel(); // a second finger: it turns, and nothing else
     this.view.letTurn(true);
     if (event.button !== 0 || !event.isPrimary) return;
     const picked = this.view.pick(event.clientX, event.clientY);
-    const mark = this.#mark(event);
+    const { tool, holding, strength } = this.selection.current;
+    const mark = tool === "paint" || tool === "point" ? null : this.#mark(event);
     if (mark && mark.distance < (picked?.distance ?? Infinity)) {
       this.view.letTurn(false);
       this.deeds.choose(mark.name);
@@ -83,8 +100,11 @@ export class Gestures {
     }
     if (!picked) return;
     this.view.letTurn(false);
-    const { tool, holding, strength } = this.selection.current;
-    if (tool === "place") {
+    if (tool === "paint") {
+      this.#begin(event.clientX, event.clientY);
+    } else if (tool === "point") {
+      this.painting?.point(picked.point);
+    } else if (tool === "place") {
       this.placing = { pointer: event.pointerId, vertex: picked.vertex };
       this.marks?.showGhost(picked.vertex);
     } else if (holding) {
@@ -98,12 +118,14 @@ export class Gestures {
 
   /** @param {PointerEvent} event */
   #move(event) {
-    if (event.buttons !== 0 && !this.placing) return;
+    if (event.buttons !== 0 && !this.placing && !this.#painting) return;
     if (this.frame) return;
     const { clientX, clientY } = event;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
+      this.#go(clientX, clientY);
       const picked = this.view.pick(clientX, clientY);
+      this.painting?.brush.hover(this.selection.current.tool === "paint" ? picked : null, this.painting.radius());
       if (this.placing) {
         this.placing.vertex = picked?.vertex ?? null;
         this.marks?.showGhost(this.placing.vertex);
@@ -118,6 +140,10 @@ export class Gestures {
   /** @param {PointerEvent} event */
   #up(event) {
     const { held, placing } = this;
+    if (this.#painting && event.isPrimary) {
+      this.#go(event.clientX, event.clientY);
+      this.#end();
+    }
     if (held?.pointer === event.pointerId) {
       this.deeds.strike(held.vertex, heldStrength((performance.now() - held.since) / 1000));
       this.#cancel();
@@ -132,12 +158,18 @@ export class Gestures {
   #cancel() {
     this.held = null;
     this.placing = null;
+    // What was shown of a stroke that is given up goes with it.
+    if (this.#painting) {
+      this.painting?.brush.end();
+      this.painting?.paint([]);
+    }
     this.gauge.hidden = true;
     this.marks?.showGhost(null);
   }
 
   #leave() {
     this.deeds.hover(null);
+    this.painting?.brush.hover(null, 0);
     if (!this.placing) this.marks?.showGhost(null);
   }
 
@@ -194,7 +226,27 @@ export class Gestures {
     const { x, y } = this.view.middle();
     const picked = this.view.pick(x, y);
     if (!picked) return;
-    if (this.selection.current.tool === "place") this.deeds.place(picked.vertex);
+    const { tool } = this.selection.current;
+    if (tool === "place") this.deeds.place(picked.vertex);
+    else if (tool === "point") this.painting?.point(picked.point);
+    else if (tool === "paint") {
+      this.#begin(x, y);
+      this.#end();
+    }
     else this.deeds.strike(picked.vertex, this.selection.current.strength);
+  }
+
+  /** Begins to paint. @param {number} x pixels of the page @param {number} y */
+  #begin(x, y) {
+    this.painting?.brush.begin(x, y, this.painting.radius(), this.painting.dab);
+  }
+
+  /** Goes on painting, if a stroke goes on. @param {number} x @param {number} y */
+  #go(x, y) {
+    this.painting?.brush.go(x, y, this.painting.dab);
+  }
+
+  #end() {
+    this.painting?.paint(this.painting.brush.end());
   }
 }

@@ -1,4 +1,4 @@
-/** The legend of the colours: a bar with moduli in GPa, and the one under the pointer. */
+/** The legend of the colours: a bar with moduli in GPa, and the one under the pointer; or the regions. */
 
 import { style } from "./colours.js";
 
@@ -34,8 +34,9 @@ export function ticks([low, high]) {
 
 /**
  * @param {HTMLElement} element
- * @returns {{show: (spanned: [number, number] | null) => void, point: (pascals: number | null) => void}} `show`
- *     tells what the ends of the map stand for, `point` which modulus is under the pointer
+ * @returns {{show: (spanned: [number, number] | null) => void, point: (pascals: number | null) => void,
+ *     list: (entries: {text: string, style: string, hatch?: number}[]) => void}} `show` tells what the ends of the map
+ *     stand for, `point` which modulus is under the pointer, `list` which regions there are in place of that
  */
 export function makeLegend(element) {
   element.className = "stage-legend";
@@ -43,7 +44,15 @@ export function makeLegend(element) {
   element.innerHTML = `
     <p class="legend-title">Young's modulus [GPa] <output class="legend-value"></output></p>
     <div class="legend-bar"><span class="legend-pointer" hidden></span></div>
-    <div class="legend-ticks"></div>`;
+    <div class="legend-ticks"></div>
+    <ul class="legend-list" hidden></ul>`;
+  const list = /** @type {HTMLElement} */ (element.querySelector(".legend-list"));
+  const scale = [...element.children].filter((child) => child !== list);
+  /** @param {boolean} isList */
+  const turn = (isList) => {
+    list.hidden = !isList;
+    for (const part of scale) /** @type {HTMLElement} */ (part).hidden = isList;
+  };
   const bar = /** @type {HTMLElement} */ (element.querySelector(".legend-bar"));
   const marks = /** @type {HTMLElement} */ (element.querySelector(".legend-ticks"));
   const value = /** @type {HTMLElement} */ (element.querySelector(".legend-value"));
@@ -56,8 +65,23 @@ export function makeLegend(element) {
   const share = (pascals) => (shown ? (Math.log10(pascals) - shown[0]) / (shown[1] - shown[0]) : 0);
 
   return {
+    list(entries) {
+      element.hidden = entries.length === 0;
+      turn(true);
+      list.replaceChildren(
+        ...entries.map(({ text, style: colour, hatch }) => {
+          const entry = document.createElement("li");
+          const chip = document.createElement("span");
+          chip.className = hatch ? `chip hatch-${hatch}` : "chip";
+          chip.style.background = hatch ? "" : colour;
+          entry.append(chip, text);
+          return entry;
+        }),
+      );
+    },
     show(spanned) {
       element.hidden = spanned === null;
+      turn(false);
       if (spanned === null || spanned === shown) return;
       shown = spanned;
       marks.replaceChildren(

@@ -4,13 +4,16 @@
  */
 
 import { Color } from "three";
+import { Brush, dabAt } from "./brush.js";
 import { makeChooser, makeUnitDialog } from "./chooser.js";
 import { span } from "./colours.js";
+import { Composition } from "./composition.js";
 import { acceptDrops } from "./files.js";
 import { Gestures } from "./gestures.js";
 import { makeLegend } from "./legend.js";
 import { Marks } from "./marks.js";
 import { makeNotices } from "./notices.js";
+import { Symbols } from "./symbols.js";
 import { makeSounding } from "./sounding.js";
 import { makeToolbar } from "./toolbar.js";
 import { View } from "./view.js";
@@ -67,6 +70,11 @@ export class Solid {
     this.marks = null;
     /** @type {Gestures | null} */
     this.gestures = null;
+    /** @type {Brush | null} */
+    this.brush = null;
+    /** @type {Symbols | null} */
+    this.symbols = null;
+    this.composition = new Composition(parts, () => this.#paint());
     try {
       this.drawing = new View(element);
     } catch (error) {
@@ -91,8 +99,12 @@ export class Solid {
       if (this.wanted !== (now.solid?.surface ?? null)) this.#fetch(now.solid?.surface ?? null);
       element.dataset.solid = now.solid === null ? "none" : now.solid.surface === null ? "awaited" : "shown";
       this.#mark();
+      this.#paint();
     });
-    parts.selection.onChange(() => this.#mark());
+    parts.selection.onChange((now, before) => {
+      this.#mark();
+      if (now.colouring !== before.colouring || now.row !== before.row) this.#paint();
+    });
     parts.connection.onBinary("bank", (header, arrays) => {
       this.material = { surface: header.surface, young: /** @type {Float32Array} */ (arrays.young) };
       this.#paint();
@@ -110,17 +122,28 @@ export class Solid {
     const { parts } = this;
     const marks = new Marks(view, labels, (name) => parts.selection.set({ target: name }));
     this.marks = marks;
+    this.brush = new Brush(view);
+    const symbols = new Symbols(view, parts);
+    this.symbols = symbols;
     view.canvas.setAttribute("role", "application");
     view.canvas.setAttribute("aria-label", HELP);
     view.onLost = (lost) => this.notices.graphics(lost ? LOST : null);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       marks.takeColours();
+      symbols.takeColours();
       this.#paint();
     });
     makeToolbar(toolbar, parts, view);
     this.gestures = new Gestures(view, marks, parts.selection, gauge, {
       strike: (vertex, strength) => this.strike(vertex, strength),
       place: (vertex) => this.#place(vertex),
+      painting: {
+        brush: this.brush,
+        radius: () => this.#radius,
+        dab: (dab, vertex) => this.#dab(dab, vertex),
+        paint: (dabs) => this.#takeStroke(dabs),
+        point: (point) => this.#hold(point),
+      },
       choose: (name) => parts.selection.set({ target: name }),
       hover: (vertex) =>
         this.legend.point(vertex === null || !this.#painted ? null : (this.material?.young[vertex] ?? null)),
@@ -144,10 +167,14 @@ export class Solid {
     keys.add(["Shift+ArrowLeft", "Shift+ArrowUp"], "In the view: shift it", elsewhere);
     keys.add(["+", "-"], "In the view: nearer, farther", elsewhere);
     keys.add("Home", "In the view: as it was seen first", elsewhere);
-    keys.add(" ", "In the view: strike it, or place a target, under the cross", elsewhere);
+    keys.add(" ", "In the view: strike it, place a target, or paint, under the cross", elsewhere);
     keys.add("Escape", "No target selected; back to striking", () => {
       if (this.gestures?.cancel()) return;
       if (selection.current.tool === "strike" && selection.current.target === null) return false;
+      if (selection.current.tool === "paint" || selection.current.tool === "point") {
+        selection.set({ tool: "strike", pending: null });
+        return;
+      }
       selection.set(selection.current.tool === "place" && selection.current.target !== null
         ? { target: null }
         : { tool: "strike", target: null });
@@ -231,6 +258,7 @@ export class Solid {
         /** @type {Uint32Array} */ (arrays.triangles),
       );
       this.marks?.setInward(/** @type {Float32Array} */ (arrays.inward));
+      if (this.brush) this.brush.inward = /** @type {Float32Array} */ (arrays.inward);
       // Its vertices have other numbers.
       if (this.shown !== null) this.parts.selection.set({ vertex: null });
       this.shown = number;
@@ -247,30 +275,104 @@ export class Solid {
   #paint() {
     const surface = this.drawing?.surface;
     if (!surface) return;
+    const composition = this.composition.of(surface);
+    surface.hatch(this.composition.hatching(surface));
+    this.symbols?.show(this.marks?.inward ?? null, composition);
+    const bare = new Color(getComputedStyle(this.element).getPropertyValue("--bare").trim());
+    if (composition && this.parts.selection.current.colouring === "regions") {
+      surface.paintRegions(composition.region, this.composition.colours(), bare);
+      this.legend.list(this.composition.legend());
+      this.drawing?.invalidate();
+      return;
+    }
     if (this.#painted && this.material) {
       this.spanned = span(this.material.young, this.spanned);
       surface.paint(this.material.young, this.spanned);
     } else {
-      const bare = getComputedStyle(this.element).getPropertyValue("--bare").trim();
-      surface.paintBare(new Color(bare));
+      surface.paintBare(bare);
     }
     this.legend.show(this.#painted ? this.spanned : null);
     this.drawing?.invalidate();
   }
 
-  /** Shows targets, and says what a click does where one is placed. */
+  /** @returns {[number[], number[]] | null} lowest and highest corner of the solid [m] */
+  bounds() {
+    const geometry = this.drawing?.surface?.geometry;
+    if (!geometry) return null;
+    geometry.computeBoundingBox();
+    const box = /** @type {import("three").Box3} */ (geometry.boundingBox);
+    const short = (/** @type {number} */ value) => Number(value.toPrecision(5));
+    return [box.min.toArray().map(short), box.max.toArray().map(short)];
+  }
+
+  /** @returns {number} radius of the brush [m], negative if it takes paint away */
+  get #radius() {
+    const { brush, erasing } = this.parts.selection.current;
+    return (erasing ? -brush : brush) * (this.parts.state.current?.solid?.longest_side_m ?? 0);
+  }
+
+  /** Shows a place that was painted. @param {import("./composition.js").Dab} dab @param {number} vertex nearest to it */
+  #dab(dab, vertex) {
+    const { row } = this.parts.selection.current;
+    const surface = this.drawing?.surface;
+    const inward = this.marks?.inward;
+    if (!row || !surface || !inward) return;
+    const normal = inward.subarray(3 * vertex, 3 * vertex + 3);
+    this.composition.preview(surface, row.kind, row.number, dab, { inward, normal });
+  }
+
+  /** @param {import("./composition.js").Dab[]} dabs of a stroke; none if it was given up */
+  #takeStroke(dabs) {
+    const { connection, selection, say } = this.parts;
+    const { row } = selection.current;
+    if (dabs.length === 0 || !row) {
+      this.composition.fetchAgain();
+      return;
+    }
+    connection.call("paint", { kind: row.kind, number: row.number, dabs }).catch((error) => {
+      this.composition.fetchAgain();
+      say(error.message, "error");
+    });
+  }
+
+  /** Places the selected support. @param {import("three").Vector3} point */
+  #hold(point) {
+    const { connection, selection, say } = this.parts;
+    const { row, pending } = selection.current;
+    if (!row) return;
+    const at = dabAt(point, 0).slice(0, 3);
+    const changes = { ...pending, at, where: null, painted: null };
+    connection.call("change_row", { kind: row.kind, number: row.number, changes }).then(
+      () => selection.set({ tool: "strike", pending: null }),
+      (error) => say(error.message, "error"),
+    );
+  }
+
+  /** Shows targets, and says what a click does where something is placed or painted. */
   #mark() {
     const { state, selection } = this.parts;
     const { target, tool } = selection.current;
     this.marks?.show(this.shown === this.wanted ? (state.current?.targets ?? []) : [], target);
-    this.hint.hidden = tool !== "place" || !this.drawing;
+    this.hint.hidden = tool === "strike" || !this.drawing;
     if (this.hint.hidden) return;
+    if (tool !== "place") {
+      this.hint.replaceChildren(this.#paintHint());
+      return;
+    }
     const says = target === null ? "Press on the solid: a target is added." : `Press on the solid: ${target} moves there.`;
     const another = document.createElement("button");
     another.type = "button";
     another.textContent = "Add another";
     another.onclick = () => selection.set({ target: null });
     this.hint.replaceChildren(says, ...(target === null ? [] : [another]));
+  }
+
+  /** @returns {string} what a press does with the selected row */
+  #paintHint() {
+    const { row, tool, erasing } = this.parts.selection.current;
+    if (tool === "point") return "Press on the solid: the support is placed there.";
+    const name = row?.kind === "regions" ? this.parts.state.current?.regions[row.number]?.name : "the support";
+    return erasing ? `Draw over the solid: paint of ${name} is taken away.` : `Draw over the solid: ${name} is painted.`;
   }
 
   /** @param {number} vertex where a target is added, or the selected one moved */

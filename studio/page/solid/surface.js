@@ -100,6 +100,9 @@ function volume(positions, triangles) {
   return sum / 6;
 }
 
+// Width of the stripes of a hatching.
+const STRIPE_PIXELS = 5;
+
 /** Waves that run over the surface from where it was struck, as a part of its material. */
 class Waves {
   constructor() {
@@ -137,13 +140,14 @@ class Waves {
         running: this.running,
       });
       shader.vertexShader = shader.vertexShader
-        .replace("#include <common>", "#include <common>\nvarying vec3 here;")
-        .replace("#include <begin_vertex>", "#include <begin_vertex>\nhere = position;");
+        .replace("#include <common>", "#include <common>\nattribute float hatch;\nvarying vec3 here;\nvarying float hatched;")
+        .replace("#include <begin_vertex>", "#include <begin_vertex>\nhere = position;\nhatched = hatch;");
       shader.fragmentShader = shader.fragmentShader
         .replace(
           "#include <common>",
           `#include <common>
           varying vec3 here;
+          varying float hatched;
           uniform vec4 strikes[${WAVES}];
           uniform float strengths[${WAVES}];
           uniform float size;
@@ -151,7 +155,13 @@ class Waves {
         )
         .replace(
           "#include <opaque_fragment>",
-          `for (int i = 0; i < running; i++) {
+          `if (hatched > 0.5) {
+            // Stripes up to the right where it is held, down to the right where springs are.
+            float along = hatched > 1.5 ? gl_FragCoord.x + gl_FragCoord.y : gl_FragCoord.x - gl_FragCoord.y;
+            float stripe = step(0.5, fract(along / ${(2 * STRIPE_PIXELS).toFixed(1)}));
+            outgoingLight = mix(outgoingLight, mix(vec3(1.0), vec3(0.02, 0.03, 0.04), stripe), 0.8);
+          }
+          for (int i = 0; i < running; i++) {
             float age = strikes[i].w / ${WAVE_SECONDS.toFixed(2)};
             if (age < 1.0) {
               float reach = size * (0.02 + 0.22 * sqrt(age)) * (0.5 + 0.5 * strengths[i]);
@@ -188,6 +198,8 @@ export class Surface {
     const colours = new THREE.BufferAttribute(new Float32Array(3 * sources.length), 3);
     colours.setUsage(THREE.DynamicDrawUsage);
     this.geometry.setAttribute("color", colours);
+    const hatch = new THREE.BufferAttribute(new Float32Array(sources.length), 1);
+    this.geometry.setAttribute("hatch", hatch);
     this.geometry.computeBoundingSphere();
     this.waves = new Waves();
     this.waves.size.value = this.sphere.radius;
@@ -224,6 +236,29 @@ export class Surface {
     const colours = /** @type {THREE.BufferAttribute} */ (this.geometry.getAttribute("color"));
     paint(/** @type {Float32Array} */ (colours.array), young, this.sources, spanned);
     colours.needsUpdate = true;
+  }
+
+  /**
+   * Writes a colour for each region.
+   *
+   * @param {ArrayLike<number>} regions numbers at the solid's vertices
+   * @param {readonly THREE.Color[]} palette of the regions
+   * @param {THREE.Color} bare of what is of none
+   */
+  paintRegions(regions, palette, bare) {
+    const colours = this.geometry.getAttribute("color");
+    for (let i = 0; i < colours.count; i++) {
+      const { r, g, b } = palette[regions[this.sources[i]]] ?? bare;
+      colours.setXYZ(i, r, g, b);
+    }
+    colours.needsUpdate = true;
+  }
+
+  /** @param {ArrayLike<number> | null} hatches 1 where the solid is held, 2 where springs are, at its vertices */
+  hatch(hatches) {
+    const attribute = this.geometry.getAttribute("hatch");
+    for (let i = 0; i < attribute.count; i++) attribute.setX(i, hatches?.[this.sources[i]] ?? 0);
+    attribute.needsUpdate = true;
   }
 
   dispose() {
