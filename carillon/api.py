@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 
 from carillon.arrays import Array, Index, Surface
 from carillon.composition.composition import PlacedRegions
-from carillon.composition.domains import Chosen, Domain
 from carillon.composition.entries import (
     CompositionEntry,
     Placed,
@@ -29,6 +28,7 @@ from carillon.composition.entries import (
     SupportEntry,
     compose,
 )
+from carillon.composition.places import Chosen, Where
 from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem import materials
@@ -187,7 +187,7 @@ class Region(RegionEntry):
     """Comparisons of x, y and z [m] that hold in it, such as `z < 0.01`; or a function of points
     (p, 3) [m] that returns which of them (p,) are in it."""
 
-    def domain(self, solid: SolidFrame) -> Domain:
+    def domain(self, solid: SolidFrame) -> Where:
         """See `RegionEntry.domain`."""
         return Chosen(self.where) if callable(self.where) else super().domain(solid)
 

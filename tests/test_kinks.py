@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from carillon.composition.domains import Everywhere, Expression
 from carillon.composition.materials import named_material
+from carillon.composition.places import Everywhere, Expression
 from carillon.fem.finite_cells.kinks import Borders
 from carillon.fem.regions import Regions
 from tests.test_regions import OBLIQUE, solid, spectrum

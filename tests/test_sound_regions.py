@@ -9,8 +9,8 @@ import trimesh
 from scipy.sparse.linalg import eigsh
 
 from carillon.composition.composition import Composition, MaterialRegion
-from carillon.composition.domains import ClosedSurface, Everywhere, Expression
 from carillon.composition.materials import named_material
+from carillon.composition.places import ClosedSurface, Everywhere, Expression
 from carillon.composition.supports import Support, placed_supports
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.energies import energy_shares

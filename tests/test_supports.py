@@ -6,7 +6,7 @@ import scipy.sparse as sp
 import trimesh
 from scipy.sparse.linalg import eigsh
 
-from carillon.composition.domains import Expression
+from carillon.composition.places import Expression
 from carillon.composition.supports import Support, placed_supports
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import finite_cells

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from carillon.composition.domains import ClosedSurface, Domain, Everywhere, Placement
+from carillon.composition.places import ClosedSurface, Everywhere, Placement, Where
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells, centroids
 from carillon.fem.finite_cells.kinks import Borders
@@ -33,7 +33,7 @@ class MaterialRegion:
 
     material: Regions
     """Its row, of a material whose axes are x, y, z."""
-    place: Domain
+    place: Where
     axes: Array | AxesAt | None = None
     """(3, 3) axes of the material, in columns, or those at points; None if they are x, y, z."""
 

@@ -11,17 +11,17 @@ import numpy as np
 
 from carillon.arrays import Surface
 from carillon.composition.composition import AxesAt, Composition, MaterialRegion, axes_about
-from carillon.composition.domains import (
+from carillon.composition.materials import NamedMaterial, named_material
+from carillon.composition.painted import Painted
+from carillon.composition.places import (
     Ball,
     Box,
     ClosedSurface,
-    Domain,
     Everywhere,
     Expression,
     Labelled,
+    Where,
 )
-from carillon.composition.materials import NamedMaterial, named_material
-from carillon.composition.painted import Painted
 from carillon.composition.supports import Support
 from carillon.errors import UserError
 from carillon.fem.elasticity import axes_along, orthotropic_matrix
@@ -157,7 +157,7 @@ class RegionEntry:
         except UserError as error:
             raise UserError(f"region {self.name!r}: {error}") from None
 
-    def domain(self, solid: SolidFrame) -> Domain:
+    def domain(self, solid: SolidFrame) -> Where:
         """Where it is in a solid."""
         if self.where is not None:
             return Expression(self.where)
@@ -248,7 +248,7 @@ class SupportEntry:
             return f"support painted at {[x, y, z]}"
         return f"support {self.where!r}" if self.at is None else f"support at {list(self.at)}"
 
-    def support(self, regions: Mapping[str, Domain], surface: Surface) -> Support:
+    def support(self, regions: Mapping[str, Where], surface: Surface) -> Support:
         """The support of the solid inside a surface, whose `regions` have names.
 
         Raises UserError for a region or a material that there is not.
@@ -265,7 +265,7 @@ class SupportEntry:
             return Support(self.label, None, point, axes, spring, self.mass or 0.0)
         return Support(self.label, self._domain(regions, surface), None, axes, spring, pad=pad)
 
-    def _domain(self, regions: Mapping[str, Domain], surface: Surface) -> Domain:
+    def _domain(self, regions: Mapping[str, Where], surface: Surface) -> Where:
         if self.painted is not None:
             return Painted(surface, self.painted, depth=0.0)
         if self.at is not None and self.radius is not None:
@@ -322,7 +322,7 @@ def _part(path: str, name: str, unit: float, region: str) -> Surface:
     return own[0] if len(own) == 1 else _joined(own)
 
 
-def _labelled(path: str, label: str, unit: float, solid: SolidFrame) -> Domain:
+def _labelled(path: str, label: str, unit: float, solid: SolidFrame) -> Where:
     from carillon.fem.geometry.labels import read_labels
 
     labels = read_labels(path, unit, box=np.asarray(solid.surface.bounds))

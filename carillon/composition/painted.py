@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from carillon.arrays import Array, Flags, Index, Surface
-from carillon.composition.domains import Domain
+from carillon.composition.places import Where
 
 ON_SURFACE = 1e-6
 """Distance from the surface, in its longest sides, within which a point is on it."""
@@ -16,7 +16,7 @@ ANOTHER_SIDE = -0.3
 """Product of the unit normals of a dab and a place from which that is on the other side."""
 
 
-class Painted(Domain):
+class Painted(Where):
     """What lies below painted parts of a surface, as deep as the paint goes.
 
     A point is of it if the point of the surface that is nearest to it is painted: within the

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array, Flags, Index, Surface
-from carillon.composition.domains import ClosedSurface, Domain
+from carillon.composition.places import ClosedSurface, Where
 from carillon.errors import UserError
 from carillon.fem.embedding import embedding
 from carillon.fem.finite_cells.model import FiniteCellModel
@@ -36,7 +36,7 @@ class Support:
 
     label: str
     """What it is called in messages."""
-    domain: Domain | None = None
+    domain: Where | None = None
     point: tuple[float, float, float] | None = None
     """Where it is: all of the solid in a domain, or a point [m]."""
     axes: tuple[bool, bool, bool] = ALL
@@ -101,7 +101,7 @@ class _Samples:
         middles, areas = corners[kept].mean(axis=1), 0.5 * length[kept]
         return cls(middles, normals, areas, np.asarray(vertices), size)
 
-    def inside(self, domain: Domain) -> Index:
+    def inside(self, domain: Where) -> Index:
         """Numbers of those in a domain, or at its border."""
         slightly = SLIGHT * self.size * self.normals
         near = [domain.contains(self.points + side * slightly) for side in (0.0, 1.0, -1.0)]

@@ -10,8 +10,8 @@ from trimesh.creation import box
 from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.composition.composition import Composition, MaterialRegion
-from carillon.composition.domains import ClosedSurface, Everywhere, Expression
 from carillon.composition.materials import named_material
+from carillon.composition.places import ClosedSurface, Everywhere, Expression
 from carillon.composition.supports import Support, placed_supports
 from carillon.fem.elasticity import axes_along, rotated
 from carillon.fem.finite_cells.build import finite_cells

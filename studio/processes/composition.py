@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Surface
-from carillon.composition.domains import Domain
 from carillon.composition.entries import RegionEntry, SolidFrame, SupportEntry
+from carillon.composition.places import Where
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import surface_name
 from carillon.parameters.documents import parameters_from
@@ -98,7 +98,7 @@ def _nowhere(points: Array) -> NDArray[np.int64]:
 
 
 def _supported(
-    entry: SupportEntry, regions: Mapping[str, Domain], surface: Surface, slight: Array
+    entry: SupportEntry, regions: Mapping[str, Where], surface: Surface, slight: Array
 ) -> NDArray[np.bool_]:
     """Which vertices (V,) of the surface a support acts on; of one at a point, none."""
     points = np.asarray(surface.vertices, dtype=float)

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.composition.domains import Expression
 from carillon.composition.entries import Dab, RegionEntry, SupportEntry
 from carillon.composition.materials import named_material
+from carillon.composition.places import Expression
 from carillon.errors import UserError
 from carillon.parameters import OneOf
 from carillon.parameters.documents import parameters_from

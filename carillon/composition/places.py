@@ -24,7 +24,7 @@ FINEST = 64
 """Cubes along the longest side of a closed surface, by which its triangles are divided."""
 
 
-class Domain(ABC):
+class Where(ABC):
     """Part of space."""
 
     @abstractmethod
@@ -32,7 +32,7 @@ class Domain(ABC):
         """Which of the `points` (p, 3) [m] are in it."""
 
 
-class Everywhere(Domain):
+class Everywhere(Where):
     """All of space."""
 
     def contains(self, points: Array) -> Flags:
@@ -40,7 +40,7 @@ class Everywhere(Domain):
 
 
 @dataclass(frozen=True)
-class Box(Domain):
+class Box(Where):
     """A box along the axes, its faces included."""
 
     low: Array
@@ -52,7 +52,7 @@ class Box(Domain):
 
 
 @dataclass(frozen=True)
-class Ball(Domain):
+class Ball(Where):
     """A ball about a point."""
 
     centre: Array
@@ -64,7 +64,7 @@ class Ball(Domain):
         return np.asarray(((points - self.centre) ** 2).sum(axis=1) <= self.radius**2)
 
 
-class ClosedSurface(Domain):
+class ClosedSurface(Where):
     """The inside of a surface."""
 
     def __init__(self, surface: Surface) -> None:
@@ -83,7 +83,7 @@ class ClosedSurface(Domain):
 
 
 @dataclass(frozen=True)
-class Labelled(Domain):
+class Labelled(Where):
     """Where labels have one of some numbers."""
 
     labels: Labels
@@ -94,7 +94,7 @@ class Labelled(Domain):
 
 
 @dataclass(frozen=True)
-class Chosen(Domain):
+class Chosen(Where):
     """Where a function says so."""
 
     function: Callable[[Array], Any]
@@ -131,7 +131,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 _EXAMPLE = '"z < 0.01", or "x > 0.1 and hypot(y, z) < 0.005"'
 
 
-class Expression(Domain):
+class Expression(Where):
     """Where an expression of x, y and z [m] holds: comparisons, and, or, not, + - * / ** and some
     functions.
 
@@ -213,7 +213,7 @@ class Expression(Domain):
 class Placement:
     """Which of several regions places are of: the last one in their order that contains them."""
 
-    def __init__(self, places: Sequence[Domain]) -> None:
+    def __init__(self, places: Sequence[Where]) -> None:
         self._places = tuple(places)
 
     def __len__(self) -> int:
