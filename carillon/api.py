@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from carillon.arrays import Array, Index, Surface
+from carillon.composition import places
 from carillon.composition.composition import PlacedRegions
 from carillon.composition.entries import (
     CompositionEntry,
@@ -28,7 +29,6 @@ from carillon.composition.entries import (
     SupportEntry,
     compose,
 )
-from carillon.composition.places import Chosen, Where
 from carillon.composition.supports import placed_supports
 from carillon.errors import UserError
 from carillon.fem import materials
@@ -187,9 +187,9 @@ class Region(RegionEntry):
     """Comparisons of x, y and z [m] that hold in it, such as `z < 0.01`; or a function of points
     (p, 3) [m] that returns which of them (p,) are in it."""
 
-    def domain(self, solid: SolidFrame) -> Where:
+    def domain(self, solid: SolidFrame) -> places.Where:
         """See `RegionEntry.domain`."""
-        return Chosen(self.where) if callable(self.where) else super().domain(solid)
+        return places.Chosen(self.where) if callable(self.where) else super().domain(solid)
 
 
 @parameters
