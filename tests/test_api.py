@@ -197,7 +197,7 @@ def test_regions_whose_damping_is_not_known_have_that_of_the_material():
 MISTAKES = [
     (lambda _: ca.Region("a", where="x < 1", box=((0, 0, 0), (1, 1, 1))), "expected one place"),
     (lambda _: ca.Region("a", where=5), "where: found 5, expected comparisons"),
-    (lambda _: ca.Support(mass=1.0), "expected where or at"),
+    (lambda _: ca.Support(mass=1.0), "expected where, at or painted"),
     (lambda _: ca.Material(2e9, regions=PAN), "found young beside regions"),
     (lambda _: ca.Material(regions=PAN, density=900.0), "found density beside regions"),
     (lambda _: ca.Material(factor=2.0), "factor goes with regions"),

@@ -147,7 +147,7 @@ def test_wood_is_simulated_on_all_voxels_where_it_is_left_to_the_program(folder,
         ({"regions": [{"name": "a", "material": "irn"}]}, "no material 'irn'.* mean iron"),
         ({"regions": [{"name": "a"}, {"name": "a"}]}, "two regions are called 'a'"),
         ({"regions": [{"material": "iron"}]}, r"regions\[0\]: the key name is missing"),
-        ({"supports": [{"mass": 1}]}, r"supports\[0\]: expected where or at"),
+        ({"supports": [{"mass": 1}]}, r"supports\[0\]: expected where, at or painted"),
     ],
 )
 def test_regions_that_say_nothing_or_too_much(folder, keys, says):

@@ -7,14 +7,14 @@ from annotated_types import Ge, Le
 from carillon.parameters import option, parameters
 from studies.measured.data_files import solid_names
 from workflow.configuration.resources import JobLimits
-from workflow.configuration.section import Several
+from workflow.configuration.section import File, Several
 
 
 @parameters
 class MeasuredSolidsSection:
     """The study of measured and published frequencies; target measured."""
 
-    solids: Several[str] = option(
+    solids: Several[File] = option(
         tuple(solid_names()), "names of the solids, or paths of data files of others"
     )
     finer: Annotated[float, Ge(0.1), Le(10.0)] = option(

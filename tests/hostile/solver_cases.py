@@ -427,7 +427,7 @@ each(
         "ZOO/{modes,text}.h5 nowhere.h5 '' ZOO/odd/pipe.h5"
     ),
 )
-hostile("forests of another ratio", f"{MODES} --coarsen ddfem --poisson 0.3", "0.3")
+hostile("forests of another ratio", f"{MODES} --coarsen ddfem --poisson -0.3", "-0.3")
 
 # Honest failures ----------------------------------------------------------------------------------
 

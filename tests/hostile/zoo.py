@@ -17,7 +17,7 @@ VOXELS = 24
 MAKERS = (
     "dataset_gen generate --samples 200 --out shard.h5",
     "dataset_gen generate --samples 200 --shard 1 --shards 2 --out half.h5",
-    "dataset_gen generate --samples 200 --poisson 0.3 --out other.h5",
+    "dataset_gen generate --samples 200 --objective hybrid --poisson 0.3 --out other.h5",
     "forests train shard.h5 --trees 1 --depth 3 --out forests.h5",
     "forests grow shard.h5 --trees 1 --depth 3 --tree 0 --out tree0.h5",
     "forests grow shard.h5 --trees 1 --depth 3 --tree 1 --out tree1.h5",
