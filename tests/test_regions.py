@@ -219,6 +219,30 @@ def test_expressions_that_say_nothing(text, said):
         Expression(text)
 
 
+def test_functions_take_all_of_their_numbers():
+    points = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 3))
+    before = points.copy()
+    ball = Expression("hypot(x, y, z) < 0.7").contains(points)
+    assert np.array_equal(points, before)
+    assert np.array_equal(ball, np.linalg.norm(points, axis=1) < 0.7)
+    highest = Expression("maximum(x, y, z) < 0.5").contains(points)
+    assert np.array_equal(highest, points.max(axis=1) < 0.5)
+    with pytest.raises(UserError, match="gives sqrt 2 numbers"):
+        Expression("sqrt(x, y) < 1")
+
+
+def test_a_material_with_rings_leaves_other_borders_as_they_are():
+    spruce = named_material("spruce").region("spruce")
+    about = axes_about(np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    corner = Expression("x > 0.05")
+    parts = [(STEEL, Everywhere()), (BRASS, OBLIQUE)]
+    plain = solid([*parts, (STEEL, corner)], "finite-cell")
+    ringed = solid([*parts, (spruce, corner, about)], "finite-cell")
+    assert 0 < len(ringed.shared.borders) < len(plain.shared.borders) + 1
+    laws = [ringed.regions.laws[number] for number in ringed.shared.borders.region.ravel()]
+    assert all(law.poisson is not None for law in laws)
+
+
 REGIONS = """regions:
   - {name: body, material: iron}
   - {name: handle, material: beech, grain: [1, 0, 0], where: "x > 0.02"}
@@ -238,7 +262,9 @@ REGIONS = """regions:
         (REGIONS + "supports: [{where: 'x > -9'}]\n", "nothing is left that vibrates"),
         (REGIONS + "supports: [{at: [9, 9, 9]}]\n", "the nearest is"),
         (REGIONS + "supports: [{mass: 1}]\n", "expected where, at or painted"),
-        ("regions: [{name: a, mesh: missing.stl}]\n", "missing.stl"),
+        ("regions: [{name: a, young: 1.0e9, mesh: missing.stl}]\n", "missing.stl"),
+        ("regions: [{name: a}]\n", "found neither material nor young"),
+        ("regions: [{name: a, material: spruce, poisson: 0.3}]\n", "several Poisson's ratios"),
     ],
 )
 def test_files_that_describe_no_solid(text, said, tmp_path, run_cli):

@@ -253,7 +253,10 @@ def test_masses_are_of_the_body(bar):
         ({"regions": [*HALVES, HALVES[0]]}, "two regions are called 'iron'"),
         ({"regions": [{"name": "a", "material": "irn"}]}, "there is no material 'irn'"),
         ({"regions": HALVES[1:]}, "are of no region"),
-        ({"regions": [*HALVES, {"name": "c", "where": "x > 9"}]}, "region 'c' has no voxel"),
+        (
+            {"regions": [*HALVES, {"name": "c", "material": "steel", "where": "x > 9"}]},
+            "region 'c' has no voxel",
+        ),
         (
             {"material": "steel", "fixed": True, "supports": [{"where": "x > 9"}]},
             "meets nothing of solid",

@@ -111,7 +111,7 @@ async def test_paint_places_a_region_and_a_support(folder):  # noqa: F811
 async def test_paint_that_only_takes_away_is_none(folder):  # noqa: F811
     async with opened(folder) as (studio, _):
         await studio.call("open_mesh", {"mesh": "builtin:bar"})
-        row = {"name": "patch", "painted": []}
+        row = {"name": "patch", "material": "steel", "painted": []}
         await studio.call("add_row", {"kind": "regions", "row": row})
         dabs = [[0.0, 0.0, 0.0, -0.01]]
         await studio.call("paint", {"kind": "regions", "number": 0, "dabs": dabs})
@@ -155,7 +155,7 @@ async def test_what_is_wrong_with_a_place_is_told_at_its_row(folder):  # noqa: F
         await studio.call("add_row", {"kind": "supports", "row": {"where": "region:lid"}})
         await until(lambda: fault(page, "supports", 0), page)
         assert "there is no region 'lid'" in page.state["supports"][0]["fault"]
-        box = {"name": "box", "box": [[0, 0, 0], [0, 1, 1]]}
+        box = {"name": "box", "material": "steel", "box": [[0, 0, 0], [0, 1, 1]]}
         await studio.call("add_row", {"kind": "regions", "row": box})
         await until(lambda: fault(page, "regions", 1), page)
         assert "is empty" in page.state["regions"][1]["fault"]

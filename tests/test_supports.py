@@ -201,6 +201,38 @@ def test_free_motions_do_not_depend_on_how_stiff_springs_are():
     assert line.free_motions(np.zeros(3), 1.0).shape == (6, 1)
 
 
+def described(tmp_path, run_cli, text, *options):
+    """Frequencies [Hz] of the built-in bar with what a file says."""
+    from solver.files.modes_file import read_modes
+
+    (tmp_path / "held.yaml").write_text(text)
+    run_cli(
+        *("solver", "modes", "builtin:bar", "--resolution", 16, "--modes", 10, "--no-estimate"),
+        *("--regions", tmp_path / "held.yaml", "--out", tmp_path / "out.h5", *options),
+        check=True,
+    )
+    return read_modes(tmp_path / "out.h5")
+
+
+def test_a_mass_within_a_radius_is_a_mass(tmp_path, run_cli):
+    text = "supports: [{at: [0, 0, 0.03], radius: 0.02, mass: 0.1}]\n"
+    file = described(tmp_path, run_cli, text)
+    assert file.model.rigid_modes == 6
+    assert file.model.supports.mass.sum() == pytest.approx(0.1)
+    assert not file.model.supports.stiffness.any()
+
+
+def test_a_region_that_is_held_is_what_later_ones_leave_of_it(tmp_path, run_cli):
+    regions = (
+        "regions:\n  - {name: a, material: iron}\n  - {name: b, material: beech, where: 'x > 0'}\n"
+    )
+    by_name, by_place = (
+        described(tmp_path, run_cli, f"{regions}supports: [{{where: '{where}'}}]\n").frequencies
+        for where in ("region:a", "x <= 0")
+    )
+    assert np.allclose(by_name, by_place, rtol=1e-6)
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("kind", KINDS)
 def test_held_solids_of_several_materials_on_ranks(kind, mpiexec, tmp_path):

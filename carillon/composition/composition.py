@@ -12,7 +12,6 @@ from carillon.arrays import Array, Index
 from carillon.composition.places import ClosedSurface, Everywhere, Placement, Where
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells, centroids
-from carillon.fem.finite_cells.kinks import Borders
 from carillon.fem.finite_cells.regions_of_cells import regions_of_cells
 from carillon.fem.finite_cells.shared_cells import SharedCells
 from carillon.fem.geometry import HexMesh
@@ -21,7 +20,7 @@ from carillon.fem.regions import MOST, RegionOf, Regions
 DIRECTION_STEP = 1.0 / 40.0
 """What the components of axes that vary from place to place are rounded to: about a degree."""
 REACH = 2.0
-"""Largest distance, in voxels, from which a voxel of no region takes the nearest one's."""
+"""Largest distance, in voxels, from which a voxel outside the surface takes the nearest region."""
 
 AxesAt = Callable[[Array], Array]
 """Axes (p, 3, 3), in columns, of a material at points (p, 3) [m]."""
@@ -80,7 +79,8 @@ class Composition:
             raise UserError(f"{name}: no region; expected at least one")
         self._parts, self._name, self._surface = tuple(parts), name, surface
         self._rest = rest
-        self._placement = Placement([part.place for part in parts])
+        self.placement = Placement([part.place for part in parts])
+        """Which part a place is of."""
         self.regions = Regions.together([_turned(part) for part in parts])
         """A row for each region, those aside whose axes vary."""
 
@@ -95,7 +95,7 @@ class Composition:
 
         One that is of none has that of the nearest one.
         """
-        found = self._placement.at(points).astype(np.int64)
+        found = self.placement.at(points).astype(np.int64)
         lost, there = np.flatnonzero(found < 0), np.flatnonzero(found >= 0)
         if len(lost) and len(there):
             from scipy.spatial import cKDTree  # Its import takes long.
@@ -110,7 +110,7 @@ class Composition:
         """
         span = 1.0 if mesh.span is None else mesh.span[:, None]
         middles = mesh.origin + mesh.edge * (mesh.grid + 0.5 * span)
-        found = self._without_holes(self._placement.at(middles), middles, mesh.edge)
+        found = self._without_holes(self.placement.at(middles), middles, mesh.edge)
         self._require_all(found)
         return self._placed(found, middles)
 
@@ -121,9 +121,7 @@ class Composition:
         """
         if self._is_one:
             return PlacedRegions(self.regions)
-        region, shared, nowhere = regions_of_cells(
-            cells, self._placement.at, self._surface.contains
-        )
+        region, shared, nowhere = regions_of_cells(cells, self.placement.at, self._surface.contains)
         middles, _ = centroids(cells)
         found = np.where(nowhere, -1, region.astype(np.int64))
         found = self._without_holes(found, middles, cells.mesh.edge)
@@ -144,21 +142,22 @@ class Composition:
             voxel = cells.voxels[shared.cell, shared.octant]
             places = np.concatenate([middles, middles[voxel]])
             number = np.concatenate([found, shared.region])
-        regions, number = self._turned_by_place(number.astype(np.int64), places)
+        regions, number, base = self._turned_by_place(number.astype(np.int64), places)
         if len(regions) > MOST:
             raise UserError(f"{len(regions):,} directions of axes; expected {MOST:,} at most")
         region = number[: len(found)].astype(np.uint16)
         if len(regions) == 1:
             return PlacedRegions(regions)
         if shared is not None:
-            varies = any(callable(part.axes) for part in self._parts)
-            # Kinks of two regions; where axes vary, rows of the table are no regions.
-            borders = Borders.nothing() if varies else shared.borders
             numbers = number[len(found) :].astype(np.uint16)
+            # Kinks are of two regions; where axes vary, rows of the table are no regions.
+            sides = base[shared.borders.region.astype(np.int64)]
+            borders = shared.borders.some((sides >= 0).all(axis=1), sides)
             shared = replace(shared, region=numbers, borders=borders)
         return PlacedRegions(regions, region, shared)
 
-    def _turned_by_place(self, number: Index, places: Array) -> tuple[Regions, Index]:
+    def _turned_by_place(self, number: Index, places: Array) -> tuple[Regions, Index, Index]:
+        """The table, the row (p,) of each place, and that of each part, -1 where axes vary."""
         rows = [_turned(part) for part in self._parts]
         result = number.copy()
         for index, part in enumerate(self._parts):
@@ -174,17 +173,20 @@ class Composition:
         used, result = np.unique(result, return_inverse=True)
         alike = [index for index, part in enumerate(self._parts) if not callable(part.axes)]
         kept = np.union1d(used, alike).astype(np.int64)
-        return table.rows(kept), np.searchsorted(kept, used)[result.ravel()]
+        base = np.full(len(self._parts), -1)
+        base[alike] = np.searchsorted(kept, alike)
+        return table.rows(kept), np.searchsorted(kept, used)[result.ravel()], base
 
     def _without_holes(
         self, found: NDArray[np.integer], middles: Array, edge: float
     ) -> NDArray[np.integer]:
-        """Regions of all places; where rounding leaves one without, the nearest one's."""
+        """Regions of all places; those without that lie outside the surface have the nearest's."""
         holes = np.flatnonzero(found < 0)
         if not len(holes):
             return found
         there = np.flatnonzero(found >= 0)
-        if len(there):
+        inside = self._surface.contains(middles[holes])
+        if len(there) and not inside.any():
             from scipy.spatial import cKDTree  # Its import takes long.
 
             distance, nearest = cKDTree(middles[there]).query(middles[holes])

@@ -20,6 +20,7 @@ from carillon.composition.places import (
     Everywhere,
     Expression,
     Labelled,
+    Uncovered,
     Where,
 )
 from carillon.composition.supports import Support
@@ -60,7 +61,7 @@ class RegionEntry:
     name: ShownName = option(REQUIRED, "what messages and tables call it")
     material: str | None = option(None, "name of its material, such as steel or spruce")
     young: YoungsModulus | None = option(
-        None, "Young's modulus in place of the material's, where it is isotropic [Pa]"
+        None, "Young's modulus in place of the material's; of wood along the grain [Pa]"
     )
     poisson: PoissonRatio | None = option(None, "Poisson's ratio in place of the material's [1]")
     density: Density | None = option(None, "mass density in place of the material's [kg/m^3]")
@@ -146,9 +147,18 @@ class RegionEntry:
                 triples = self.grain_young, self.grain_shear, self.grain_poisson
                 matrix = orthotropic_matrix(*(np.array(triple) for triple in triples))
                 return Regions.anisotropic(matrix, density, damping, self.name)
-            if material is not None and material.is_wood and self.young is self.poisson is None:
+            if material is not None and material.is_wood:
+                if self.poisson is not None:
+                    raise UserError(
+                        f"{self.material} has several Poisson's ratios; leave poisson out or give "
+                        "grain_young, grain_shear and grain_poisson"
+                    )
                 row = material.region(self.name, density)
-                return replace(row, damping=(damping,))
+                # The modulus along the grain; the others keep their ratios to it.
+                along = row.young if self.young is None else np.array([float(self.young)])
+                return replace(row, young=along, damping=(damping,))
+            if material is None and self.young is None:
+                raise UserError("found neither material nor young; name what it is made of")
             young = self.young or (DEFAULT_YOUNG if material is None else material.young)
             poisson = self.poisson
             if poisson is None:
@@ -172,9 +182,10 @@ class RegionEntry:
         if self.labels is not None and self.label is not None:
             return _labelled(_path(self.labels, solid.folder), self.label, self.unit, solid)
         if self.mesh is not None:
-            return ClosedSurface(self.own_surface(solid.folder))
+            return ClosedSurface(_closed(self.own_surface(solid.folder), self.name))
         if self.part is not None:
-            return ClosedSurface(_part(solid.mesh, self.part, solid.unit, self.name))
+            part = _part(solid.mesh, self.part, solid.unit, self.name)
+            return ClosedSurface(_closed(part, self.name))
         if self.painted is not None:
             return Painted(solid.surface, self.painted, self.depth)
         return Everywhere()
@@ -224,7 +235,9 @@ class SupportEntry:
     )
     pad: str | None = option(None, "name of the material of a pad that it rests on")
     thickness: Positive | None = option(None, "thickness of the pad [m]")
-    mass: Positive | None = option(None, "mass that is fixed to the point [kg]")
+    mass: Positive | None = option(
+        None, "mass that is fixed to the point, or to all within the radius [kg]"
+    )
 
     def __post_init__(self) -> None:
         if [self.where, self.at, self.painted].count(None) != 2:
@@ -263,7 +276,8 @@ class SupportEntry:
         if self.at is not None and self.radius is None:
             point = (float(self.at[0]), float(self.at[1]), float(self.at[2]))
             return Support(self.label, None, point, axes, spring, self.mass or 0.0)
-        return Support(self.label, self._domain(regions, surface), None, axes, spring, pad=pad)
+        place, mass = self._domain(regions, surface), self.mass or 0.0
+        return Support(self.label, place, None, axes, spring, mass, pad)
 
     def _domain(self, regions: Mapping[str, Where], surface: Surface) -> Where:
         if self.painted is not None:
@@ -382,16 +396,39 @@ def compose(
     of no region, without which there must be nothing such. Raises UserError for files, materials
     and places that are of no use.
     """
-    domains = {each.name: each.domain(solid) for each in entry.regions}
-    composition = None
-    parts = [MaterialRegion(each.row(), domains[each.name], each.axes()) for each in entry.regions]
+    composition, seen = None, dict[str, Where]()
+    parts = [_material_region(each, solid) for each in entry.regions]
     if rest is not None:
         parts.insert(0, MaterialRegion(rest, Everywhere()))
     if parts:
         inside = ClosedSurface(solid.surface)
         composition = Composition(parts, solid.name, inside, rest is not None)
+        placement, first = composition.placement, len(parts) - len(entry.regions)
+        seen = {
+            each.name: Uncovered(placement, number)
+            for number, each in enumerate(entry.regions, first)
+        }
     entries = [*entry.supports, *(SupportEntry(where=where) for where in fixed)]
-    return Placed(composition, tuple(each.support(domains, solid.surface) for each in entries))
+    return Placed(composition, tuple(each.support(seen, solid.surface) for each in entries))
+
+
+def _material_region(entry: RegionEntry, solid: SolidFrame) -> MaterialRegion:
+    row = entry.row()
+    # The axes of what is the same in all directions are no matter.
+    axes = None if row.is_isotropic else entry.axes()
+    return MaterialRegion(row, entry.domain(solid), axes)
+
+
+def _closed(surface: Surface, region: str) -> Surface:
+    """A surface that is closed, once equal vertices are one; raises UserError for others."""
+    merged = type(surface)(surface.vertices, surface.faces, process=False)
+    merged.merge_vertices(merge_tex=True, merge_norm=True)
+    if not merged.is_watertight:
+        raise UserError(
+            f"region {region!r}: its surface is not closed, so that it has no inside; close the "
+            "holes of the mesh"
+        )
+    return surface
 
 
 def joined_surface(entry: CompositionEntry, path: str) -> Surface:

@@ -7,6 +7,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -125,8 +126,11 @@ _OPERATIONS: dict[type, Callable[..., Any]] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    name: getattr(np, name) for name in ("sqrt", "abs", "sin", "cos", "hypot", "minimum", "maximum")
+_OF_ONE: dict[str, Callable[..., Any]] = {
+    name: getattr(np, name) for name in ("sqrt", "abs", "sin", "cos")
+}
+_OF_SEVERAL: dict[str, Callable[..., Any]] = {
+    name: getattr(np, name) for name in ("hypot", "minimum", "maximum")
 }
 _EXAMPLE = '"z < 0.01", or "x > 0.1 and hypot(y, z) < 0.005"'
 
@@ -194,13 +198,14 @@ class Expression(Where):
                     return _OPERATIONS[type(node.op)](*map(np.asarray, sides))
             case ast.UnaryOp() if type(node.op) in _OPERATIONS:
                 return _OPERATIONS[type(node.op)](self._number(node.operand, points))
-            case ast.Call(func=ast.Name(id=name), keywords=[]) if name in _FUNCTIONS:
-                given = [self._number(each, points) for each in node.args]
-                try:
-                    with np.errstate(all="ignore"):
-                        return _FUNCTIONS[name](*given)
-                except (TypeError, ValueError):
-                    raise self._refused(f"gives {name} {len(given)} numbers") from None
+            case ast.Call(func=ast.Name(id=name), keywords=[]) if name in _OF_ONE | _OF_SEVERAL:
+                given = [np.asarray(self._number(each, points)) for each in node.args]
+                if (name in _OF_ONE) != (len(given) == 1) or not given:
+                    raise self._refused(f"gives {name} {len(given)} numbers")
+                with np.errstate(all="ignore"):
+                    if name in _OF_ONE:
+                        return _OF_ONE[name](given[0])
+                    return reduce(_OF_SEVERAL[name], given)
         raise self._refused(f"has {ast.unparse(node)[:40]!r} where a number belongs")
 
     def _refused(self, reason: str) -> UserError:
@@ -208,6 +213,17 @@ class Expression(Where):
             f"{self.text[:60]!r} {reason}; expected comparisons of x, y and z [m], such as "
             f"{_EXAMPLE}"
         )
+
+
+@dataclass(frozen=True)
+class Uncovered(Where):
+    """Where one of several regions is seen, which later ones may lie over."""
+
+    placement: Placement
+    number: int
+
+    def contains(self, points: Array) -> Flags:
+        return np.asarray(self.placement.at(points) == self.number)
 
 
 class Placement:

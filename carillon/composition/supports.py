@@ -44,7 +44,7 @@ class Support:
     spring: Array | None = None
     """Springs in place of holding it: a number or (3, 3) [N/m] at a point, [N/m^3] by area."""
     mass: float = 0.0
-    """Mass [kg] that is fixed to a point, which does not hold it."""
+    """Mass [kg] that is fixed there, which does not hold it."""
     pad: tuple[float, float] | None = None
     """Springs [N/m^3] by area across and along the surface, in place of `spring`."""
 
@@ -118,7 +118,7 @@ def _placed(
     along = np.diag(np.asarray(part.axes, dtype=float))
     if part.spring is not None or part.pad is not None:
         if not len(own):
-            raise _misses(part, samples, name)
+            raise _misses(part, samples, name, "the surface of ")
         areas = samples.areas[own, None, None]
         if part.pad is not None:
             across, sliding = part.pad
@@ -137,8 +137,14 @@ def _placed(
     points = np.concatenate([nodes, samples.points[own], corners])
     if not len(points):
         raise _misses(part, samples, name)
+    if part.mass:
+        return Supports(points, np.zeros((len(points), 3, 3)), _spread(part.mass, len(points)))
     springs = _stiff(solid, points)[:, None, None] * along
     return Supports(points, springs, np.zeros(len(points)))
+
+
+def _spread(mass: float, count: int) -> Array:
+    return np.full(count, mass / count)
 
 
 def _is_in_solid(points: Array, surface: Surface, size: float) -> Flags:
@@ -203,12 +209,12 @@ def _stiff(solid: Solid, points: Array) -> Array:
     return whole * share
 
 
-def _misses(part: Support, samples: _Samples, name: str) -> UserError:
+def _misses(part: Support, samples: _Samples, name: str, of: str = "") -> UserError:
     low, high = samples.points.min(axis=0), samples.points.max(axis=0)
     box = " and ".join(
         f"{low[axis]:.4g} <= {letter} <= {high[axis]:.4g}" for axis, letter in enumerate("xyz")
     )
-    return UserError(f"{part.label} meets nothing of solid {name!r}, which has {box} [m]")
+    return UserError(f"{part.label} meets nothing of {of}solid {name!r}, which has {box} [m]")
 
 
 def _require_movable(parts: Sequence[Support], solid: Solid, name: str) -> None:
@@ -216,7 +222,8 @@ def _require_movable(parts: Sequence[Support], solid: Solid, name: str) -> None:
     nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
     held = np.zeros((len(nodes), 3), dtype=bool)
     for part in parts:
-        if part.domain is None or part.spring is not None or part.pad is not None:
+        springy = part.spring is not None or part.pad is not None
+        if part.domain is None or springy or part.mass:
             continue
         held |= part.domain.contains(nodes)[:, None] & np.asarray(part.axes)
     if held.all():

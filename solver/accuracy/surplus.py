@@ -105,6 +105,9 @@ def losses(model: FiniteCellModel, modes: Array) -> tuple[Array, Array, Index]:
     """
     cells = model.cells
     pairs, span = face_neighbours(model.hexmesh), cells.span
+    kind = _kinds(model)
+    # Larger cells would not know where materials change.
+    pairs = pairs[kind[pairs[:, 0]] == kind[pairs[:, 1]]]
     twice, fourfold = np.zeros((2, len(cells), modes.shape[1]))
     group = np.zeros(len(cells), dtype=np.int64)
     for size in np.unique(span):
@@ -115,4 +118,18 @@ def losses(model: FiniteCellModel, modes: Array) -> tuple[Array, Array, Index]:
             energies = energy_lost(model, modes, asked, corners, factor * int(size))
             lost[own] = energies[own]
         group[own] = groups[own] + group.max(initial=0) + 1
+    at_border = kind < 0
+    twice[at_border] = fourfold[at_border] = 0.0
     return twice, fourfold, np.unique(group, return_inverse=True)[1].ravel()
+
+
+def _kinds(model: FiniteCellModel) -> Index:
+    """Region (c,) of each cell; -1 of those that several have a part in."""
+    elements = model.elements
+    if elements.law is None:
+        return np.zeros(len(model.cells), dtype=np.int64)
+    there = elements.shares.any(axis=2)
+    law = np.where(
+        there, elements.law, elements.law[np.arange(len(there)), there.argmax(1)][:, None]
+    )
+    return np.where((law == law[:, :1]).all(axis=1), law[:, 0].astype(np.int64), -1)

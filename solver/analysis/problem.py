@@ -223,6 +223,12 @@ def _composed(options: ProblemOptions, surface: SolidSurface) -> Placed:
         described = options.mesh
     if described is not None:
         entry, folder = read_composition(described), Path(described).parent
+    given = (options.poisson, options.density) != (DEFAULT_POISSON, DEFAULT_DENSITY)
+    if entry.regions and given:
+        raise UserError(
+            f"{described} has regions with Poisson's ratios and densities of their own; leave out "
+            "--poisson and --density"
+        )
     frame = SolidFrame(options.mesh, surface.triangles, surface.name, options.unit, folder)
     return compose(entry, frame, options.fix or ())
 

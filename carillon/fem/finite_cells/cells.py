@@ -195,17 +195,29 @@ def _voxels_of(
 def centroids(cells: FiniteCells) -> tuple[Array, Array]:
     """Middles (m, 3) [m] of what is inside each voxel, and its covariances (m, 3, 3) [m^2]."""
     cell, octant = np.nonzero(cells.voxels >= 0)
-    order = np.argsort(cells.voxels[cell, octant])
+    order = np.argsort(cells.voxels[cell, octant], kind="stable")
     cell, octant = cell[order], octant[order]
     weights = cells.weights[cells.row[cell], octant]
-    places = 2.0 * points()
+    scale = cells.span[cell].astype(float)
     volume = weights.sum(axis=1)
-    middles = weights @ places / volume[:, None]
-    squares = (places[:, :, None] * places[:, None, :]).reshape(len(places), -1)
-    second = (weights @ squares / volume[:, None]).reshape(-1, 3, 3)
-    covariance = second - middles[:, :, None] * middles[:, None, :]
+    middles = scale[:, None] * (weights @ points() / volume[:, None])
+    squares = (points()[:, :, None] * points()[:, None, :]).reshape(len(points()), -1)
+    second = (scale**2 / volume)[:, None] * (weights @ squares)
+    covariance = second.reshape(-1, 3, 3) - middles[:, :, None] * middles[:, None, :]
+    middles = cells.grid[cell] + middles
+    if cells.is_mixed:
+        # A divided cell lies in one voxel, with all of its octants.
+        voxel = cells.voxels[cell, octant]
+        first = np.flatnonzero(np.diff(voxel, prepend=-1))
+        share = volume * scale**3
+        total = np.add.reduceat(share, first)
+        joined = np.add.reduceat(share[:, None] * middles, first) / total[:, None]
+        apart = middles - joined[voxel]
+        covariance += apart[:, :, None] * apart[:, None, :]
+        summed = np.add.reduceat(share[:, None, None] * covariance, first)
+        middles, covariance = joined, summed / total[:, None, None]
     edge = cells.mesh.edge
-    return cells.mesh.origin + edge * (cells.grid[cell] + middles), edge**2 * covariance
+    return cells.mesh.origin + edge * middles, edge**2 * covariance
 
 
 def surface_points(cells: FiniteCells, voxels: NDArray[np.integer], outward: Array) -> Array:

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.element import strain_displacement
 from carillon.fem.finite_cells.shapes import POINTS, points, shape_gradients
 from carillon.fem.regions import RegionOf, Regions
@@ -47,6 +48,12 @@ class Borders:
 
     def __len__(self) -> int:
         return len(self.cell)
+
+    def some(self, chosen: Flags, region: NDArray[np.integer]) -> Borders:
+        """Those chosen (k,), with other numbers (k, 2) of their regions."""
+        arrays = (getattr(self, name)[chosen] for name in ("cell", "place", "normal", "share"))
+        cell, place, normal, share = arrays
+        return Borders(cell, region[chosen].astype(np.uint16), place, normal, share)
 
     @classmethod
     def nothing(cls) -> Borders:
