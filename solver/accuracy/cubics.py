@@ -81,6 +81,9 @@ def cubic_surplus(model: FiniteCellModel, values: Array, modes: Array) -> CubicS
         if elements.support is not None:
             # What holds a cell holds these functions, too.
             inside &= elements.support[few] < 0
+        if elements.kink is not None:
+            # Kinks take part in the strains there, and these know nothing of them.
+            inside &= elements.kink[few] < 0
         forces[few] = pulled.reshape(len(moved), 36, -1) * values - across @ moved
         forces[few] *= inside[:, None, None]
     return _solved(matrices, dofs, 3 * count, forces, FLOOR * _typical(model))
