@@ -107,7 +107,10 @@ for what, keys, says in (
     ("regions not in modes", {"modes": "m.h5", "regions": "[{name: a}]"}, "has no region 'a'"),
     (
         "a region of code",
-        {"mesh": "builtin:bar", "regions": "[{name: a, where: __import__('os') < 1}]"},
+        {
+            "mesh": "builtin:bar",
+            "regions": "[{name: a, material: iron, where: __import__('os') < 1}]",
+        },
         "where a number belongs",
     ),
     (
