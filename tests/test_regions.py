@@ -301,6 +301,26 @@ def test_modes_files_keep_regions_and_supports(kind, tmp_path, run_cli):
     assert run_cli("solver", "audit", out).returncode == 0
 
 
+@pytest.mark.parametrize("name", ["border_cell", "border_region", "cell", "octant", "region"])
+@pytest.mark.parametrize("number", [-1, 1_000_000])
+def test_shared_cells_that_name_what_is_not_there_are_refused(name, number, tmp_path):
+    import h5py
+
+    from solver.files.regions_group import get_shared, put_regions, put_shared
+
+    model = solid([(STEEL, Everywhere()), (BRASS, OBLIQUE)], "finite-cell")
+    with h5py.File(tmp_path / "solid.h5", "w") as file:
+        put_regions(file, model.regions, model.region)
+        put_shared(file, model.shared)
+        assert len(get_shared(file, model.cells, file).cell)
+        values = file["shared"][name][:].astype(np.int64)
+        values[0] = number
+        del file["shared"][name]
+        file["shared"][name] = values
+        with pytest.raises(UserError, match="that are not there"):
+            get_shared(file, model.cells, file)
+
+
 def test_uniform_solids_are_written_as_ever(tmp_path, run_cli):
     import h5py
 

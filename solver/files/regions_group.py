@@ -86,7 +86,7 @@ def get_regions(group: h5py.Group, shape: tuple[int, ...]) -> tuple[Regions, Reg
     if count == 1:
         return regions, None
     region = read(group, "region", shape, INTEGER)
-    if region.min(initial=0) < 0 or region.max(initial=0) >= count:
+    if _beyond(region, count):
         raise refused(group, "dataset 'region' names materials that are not there")
     return regions, region.astype(np.uint16)
 
@@ -115,7 +115,7 @@ def get_shared(group: h5py.Group, cells: FiniteCells, solid: h5py.Group) -> Shar
     octant, region = (read(inner, name, (len(cell),), INTEGER) for name in ("octant", "region"))
     weights = read(inner, "weights", (len(cell), POINTS))
     limits = ((cell, len(cells)), (octant, OCTANTS), (region, count))
-    if any(len(each) and (each.min() < 0 or each.max() >= most) for each, most in limits):
+    if any(_beyond(each, most) for each, most in limits):
         raise refused(inner, "names cells, octants or materials that are not there")
     if (cells.voxels[cell, octant] < 0).any():
         raise refused(inner, "has parts in empty octants")
@@ -128,12 +128,17 @@ def get_shared(group: h5py.Group, cells: FiniteCells, solid: h5py.Group) -> Shar
     )
 
 
+def _beyond(numbers: Array, count: int) -> bool:
+    """Whether any of the numbers does not lie in 0 to `count` - 1."""
+    return bool(((numbers < 0) | (numbers >= count)).any())
+
+
 def _get_borders(group: h5py.Group, cells: int, count: int) -> Borders:
     cell = read(group, "border_cell", (None,), INTEGER)
     region = read(group, "border_region", (len(cell), 2), INTEGER)
     place, normal = (read(group, f"border_{name}", (len(cell), 3)) for name in ("place", "normal"))
     share = read(group, "border_share", (len(cell), 2))
-    if len(cell) and not (0 <= cell.min() <= cell.max() < cells and region.max() < count):
+    if _beyond(cell, cells) or _beyond(region, count):
         raise refused(group, "names borders of cells or materials that are not there")
     if (share <= 0.0).any() or (np.abs(np.linalg.norm(normal, axis=1) - 1.0) > 1e-6).any():
         raise refused(group, "has borders with normals or shares that are none")
@@ -151,7 +156,7 @@ def put_supports(group: h5py.Group, supports: Supports | None) -> None:
 
 
 def get_supports(group: h5py.Group) -> Supports | None:
-    """What holds a solid; raises UserError if it makes no sense."""
+    """The supports of a solid; raises UserError if they make no sense."""
     if SUPPORTS not in group:
         return None
     inner = group[SUPPORTS]
