@@ -1,28 +1,14 @@
 """What the study of the discretisations has found."""
 
-from functools import cached_property
 from typing import Any
 
-from studies.base.conditions import Record
-from studies.base.results import Results
-
-FILE = "accuracy.json"
+from studies.base.results import ResultsOfOneFile
 
 
-class AccuracyStudy(Results):
+class AccuracyStudy(ResultsOfOneFile):
     """The folder of the study."""
 
     section = "accuracy"
-
-    @cached_property
-    def measured(self) -> dict[str, Any]:
-        """Output of `solver accuracy`."""
-        return self.read_json(FILE)
-
-    @property
-    def origins(self) -> dict[str, Record]:
-        """Provenance of the measurement."""
-        return {FILE: self.measured["provenance"]}
 
     @property
     def without(self) -> str:

@@ -101,3 +101,22 @@ class Results:
 def spelt(name: str) -> str:
     """A name with hyphens as the beginning of a sentence."""
     return name.replace("-", " ").capitalize()
+
+
+class ResultsOfOneFile(Results):
+    """The folder of a study whose measurements are all in one file, named by its section."""
+
+    @property
+    def file(self) -> str:
+        """Name of that file."""
+        return f"{self.section}.json"
+
+    @cached_property
+    def measured(self) -> dict[str, Any]:
+        """Output of the study's command."""
+        return self.read_json(self.file)
+
+    @property
+    def origins(self) -> dict[str, Record]:
+        """Provenance of the measurement."""
+        return {self.file: self.measured["provenance"]}

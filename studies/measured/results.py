@@ -1,29 +1,15 @@
 """What the study of measured frequencies has found."""
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import Any
 
-from studies.base.conditions import Record
-from studies.base.results import Results
-
-FILE = "measured.json"
+from studies.base.results import ResultsOfOneFile
 
 
-class MeasuredStudy(Results):
+class MeasuredStudy(ResultsOfOneFile):
     """The folder of the study."""
 
     section = "measured"
-
-    @cached_property
-    def measured(self) -> dict[str, Any]:
-        """Output of `carillon study measured`."""
-        return self.read_json(FILE)
-
-    @property
-    def origins(self) -> dict[str, Record]:
-        """Provenance of the measurement."""
-        return {FILE: self.measured["provenance"]}
 
     @property
     def without(self) -> str:
