@@ -194,7 +194,7 @@ class Region(RegionEntry):
 
 @parameters
 class Support(SupportEntry):
-    """What holds a solid somewhere, lets it rest on a pad or on springs, or is fixed to it.
+    """A support of a solid: a held place, a pad, springs, or a mass that is fixed to it.
 
     It is `where` comparisons of x, y and z [m] hold, or region:NAME, or `at` a point (3,) [m], or
     within a `radius` [m] about that. It acts `along` some axes, and holds what is there, unless it

@@ -1,1 +1,1 @@
-"""What a solid is made of and what holds it: regions with their materials and places, supports."""
+"""Regions of a solid with their materials and places, and its supports."""

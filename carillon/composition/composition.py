@@ -1,4 +1,4 @@
-"""What a solid is made of: regions with their materials and places, in any discretisation."""
+"""Regions of a solid with their materials and places, in any discretisation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from carillon.fem.geometry import HexMesh
 from carillon.fem.regions import MOST, RegionOf, Regions
 
 DIRECTION_STEP = 1.0 / 40.0
-"""What the components of axes that vary from place to place are rounded to: about a degree."""
+"""Step to which components of axes are rounded where axes vary over the solid: about a degree."""
 REACH = 2.0
 """Largest distance, in voxels, from which a voxel outside the surface takes the nearest region."""
 

@@ -215,7 +215,7 @@ class RegionEntry:
 
 @parameters
 class SupportEntry:
-    """What holds a solid somewhere, or is fixed to it."""
+    """A support as files have it: a held place, a pad, springs, or a mass fixed to the solid."""
 
     where: str | None = option(
         None, "comparisons of x, y and z [m] that hold there, such as z < 0.01; or region:NAME"
@@ -255,7 +255,7 @@ class SupportEntry:
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Name of the support in messages: its place."""
         if self.painted is not None:
             x, y, z, _ = self.painted[0]
             return f"support painted at {[x, y, z]}"
@@ -296,7 +296,7 @@ class SupportEntry:
 
 @parameters
 class CompositionEntry:
-    """What a solid is made of, and what holds it."""
+    """Regions and supports of a solid, as files have them."""
 
     regions: Annotated[tuple[RegionEntry, ...], Within(max_length=1000)] = option(
         (), "regions in their order: of several in one place the last one counts"

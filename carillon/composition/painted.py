@@ -17,7 +17,7 @@ ANOTHER_SIDE = -0.3
 
 
 class Painted(Where):
-    """What lies below painted parts of a surface, as deep as the paint goes.
+    """The part of a solid below painted parts of its surface, as deep as the paint goes.
 
     A point is of it if the point of the surface that is nearest to it is painted: within the
     radius of one of the dabs, and, if the paint has a depth, on the side of the wall that this is

@@ -1,4 +1,4 @@
-"""What holds a solid: springs at points of it, stiff ones where it is clamped, and point masses."""
+"""Supports of a solid: springs at its points, stiff ones where it is clamped, and point masses."""
 
 from __future__ import annotations
 

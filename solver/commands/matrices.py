@@ -4,8 +4,8 @@ The solid is described as for `modes`, or it is that of a modes file. Names of m
 (Matrix Market, the lower triangle), .petsc (PETSc's binary format) or .npz (scipy). Row 3 n + a,
 counted from 0, is the displacement of node n along axis a; nodes are ordered by z, then y, then x,
 and their positions [m] go into the file of --nodes. With the eigenvalues lambda [rad^2/s^2] of
-K u = lambda M u, frequencies are sqrt(lambda) / (2 pi) [Hz]; the first six are those of rigid
-motions.
+K u = lambda M u, frequencies are sqrt(lambda) / (2 pi) [Hz]; those of the rigid motions that
+supports leave come first, six of a free solid.
 """
 
 import argparse
