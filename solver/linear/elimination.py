@@ -16,9 +16,6 @@ from solver.linear.plan import Plan
 
 compiled = compiler(Path(__file__), Path(panels.__file__))
 
-BLOCKED = 64
-"""Columns that LAPACK eliminates together, for which it needs room."""
-
 
 def eliminate_fronts(
     plan: Plan,
@@ -26,7 +23,7 @@ def eliminate_fronts(
     mass: Array,
     shift: float,
     threads: int,
-    kept: tuple[Array, Array] | None,
+    kept: tuple[Array, Array, Array] | None,
     dtype: Any = np.float64,
 ) -> tuple[int, Array]:
     """Eliminate the rows of K - shift M that the plan eliminates.
@@ -40,7 +37,7 @@ def eliminate_fronts(
     plan, stiffness, mass, shift, threads
         See `solver.linear.multifrontal.Factor`.
     kept
-        What a solve needs goes there: pivots with what couples panels, and W in strips.
+        What a solve needs goes there: pivots with what couples panels, W in strips, and signs.
     dtype
         Precision that the fronts are eliminated in, and kept in.
     """
@@ -61,7 +58,7 @@ def eliminate_fronts(
                 _subtract_from_own(own, first, stop, plan.places[child], updates[child])
 
         def update_strip(first: int) -> None:
-            _update_strip(own, inverses, coupling, update, first)
+            _update_strip(own, signs, coupling, update, first)
             for child in children:
                 _add_beyond(update, b, first // 3, n // 3, plan.places[child], updates[child])
 
@@ -70,7 +67,9 @@ def eliminate_fronts(
         if kept is not None:
             pivots = kept[0][plan.pivot_offset[front] : plan.pivot_offset[front + 1]]
             coupling = kept[1][plan.coupling_offset[front] : plan.coupling_offset[front + 1]]
-        inverses, negative = _eliminate_panels(own, pivots, threads)
+        signs = _eliminate_panels(own, pivots, threads)
+        if kept is not None:
+            kept[2][plan.sign_offset[front] : plan.sign_offset[front + 1]] = signs
         if b:
             update = np.empty(packed_size(b), dtype)
             in_parallel(update_strip, [(first,) for first in range(0, b, STRIP)], threads)
@@ -79,7 +78,7 @@ def eliminate_fronts(
             updates[front] = update
         for child in children:
             del updates[child]
-        return negative
+        return int((signs < 0.0).sum())
 
     def eliminated_part(first: int, stop: int, threads: int = 1) -> int:
         largest = (own_rows[first:stop] * (own_rows + outside)[first:stop]).max()
@@ -98,80 +97,91 @@ def eliminate_fronts(
     return negative, rest
 
 
-def _eliminate_panels(own: Array, pivots: Array | None, threads: int) -> tuple[list[Array], int]:
+def _eliminate_panels(own: Array, pivots: Array | None, threads: int) -> Array:
     """Eliminate the own rows of a front, a panel of them at a time.
 
-    Returns the inverses of the diagonal blocks, and how many of their eigenvalues are negative.
+    Returns the signs (n,) of the eigenvalues of the diagonal blocks.
 
     Parameters
     ----------
     own
         (n, n + b) own rows of the matrix, of which the upper triangle counts; on return those of
-        the matrix from which the panels before were eliminated.
+        the matrix from which the panels before were eliminated, times the roots X of `roots_of`.
     pivots
-        What becomes of each panel's own columns: the inverse of its diagonal block, and the product
-        with it of what couples the panel to the panels after.
+        What becomes of each panel's own columns: the root of the inverse of its diagonal block, and
+        what couples the panel to the panels after, times it and the signs.
     threads
         They share the columns beyond.
     """
     n = len(own)
-    panels = panels_of(n)
-    scaled = np.empty((n, n), own.dtype)
-    inverses: list[Array] = []
-    negative = place = 0
+    panels, signs = panels_of(n), np.empty(n, own.dtype)
+    roots: list[Array] = []
+    place = 0
 
     def take_off(start: int, stop: int, first: int, last: int) -> None:
-        own[start:stop, first:last] -= scaled[:start, start:stop].T @ own[:start, first:last]
+        turned = signs[:start, None] * own[:start, start:stop]
+        own[start:stop, first:last] -= turned.T @ own[:start, first:last]
 
     def take_off_beyond(first: int, last: int) -> None:
-        for start, stop in panels[1:]:
-            take_off(start, stop, n + first, n + last)
+        for (start, stop), root in zip(panels, roots, strict=True):
+            if start:
+                take_off(start, stop, n + first, n + last)
+            own[start:stop, n + first : n + last] = root @ own[start:stop, n + first : n + last]
 
     for start, stop in panels:
         if start:
             take_off(start, stop, start, n)
-        inverse, below = inverse_of(own[start:stop, start:stop])
-        inverses.append(inverse)
-        negative += below
-        later = scaled[start:stop, stop:]
-        np.matmul(inverse, own[start:stop, stop:n], out=later)
+        root, signs[start:stop] = roots_of(own[start:stop, start:stop])
+        roots.append(root)
+        own[start:stop, stop:n] = root @ own[start:stop, stop:n]
         if pivots is None:
             continue
-        for part in (inverse, later):
+        for part in (root, signs[start:stop, None] * own[start:stop, stop:n]):
             pivots[place : place + part.size].reshape(part.shape)[:] = part
             place += part.size
-    if len(panels) > 1:
-        in_parallel(take_off_beyond, split(own.shape[1] - n, threads, own.shape[1]), threads)
-    return inverses, negative
+    beyond = own.shape[1] - n
+    if beyond:
+        in_parallel(take_off_beyond, split(beyond, threads, own.shape[1]), threads)
+    return signs
 
 
-def inverse_of(block: Array) -> tuple[Array, int]:
-    """Inverse of a symmetric matrix, given its upper triangle, and its negative eigenvalues."""
-    room = BLOCKED * len(block)
-    sytrf, sytri = la.get_lapack_funcs(("sytrf", "sytri"), (block,))
-    factor, pivots, _ = sytrf(np.array(block).T, lower=1, lwork=room, overwrite_a=1)
-    # Every 2x2 pivot of Bunch and Kaufman has one eigenvalue of either sign.
-    single = pivots > 0
-    negative = int((np.diag(factor)[single] < 0.0).sum() + (~single).sum() // 2)
-    inverse, failed = sytri(factor, pivots, lower=1, overwrite_a=1)
-    if failed:
+def roots_of(block: Array) -> tuple[Array, Array]:
+    """X (n, n) and signs s (n,) of a symmetric matrix A, given its upper triangle.
+
+    A^-1 = X^T diag(s) X. Products with X, and then X^T, keep digits where A is badly conditioned,
+    as that of a thin wall in a cell is: their errors are of the size of the condition's root, and
+    along motions that hardly have energy. Those with A^-1 would be of the size of the condition,
+    anywhere (Higham 2002, section 14).
+    """
+    scale = np.sqrt(np.abs(np.diag(block)))
+    scale[scale == 0.0] = 1.0
+    scaled = block / scale / scale[:, None]
+    potrf, trtri = la.get_lapack_funcs(("potrf", "trtri"), (scaled,))
+    # The upper triangle of a row-major matrix is the lower one of a column-major one.
+    lower, failed = potrf(scaled.T, lower=1, clean=1)
+    if not failed:
+        root, failed = trtri(lower, lower=1)
+    if not failed:
+        return np.ascontiguousarray(root / scale), np.ones(len(block), block.dtype)
+    values, vectors = la.eigh(scaled.T, lower=True, check_finite=False)
+    size = np.abs(values)
+    if not size.min() > np.finfo(block.dtype).tiny:
         raise LocalConvergenceError("the shifted matrix is singular to rounding; change the shift")
-    result = inverse.T
-    _mirror(result)
-    return result, negative
+    root = vectors.T / np.sqrt(size)[:, None] / scale
+    return np.ascontiguousarray(root), np.sign(values)
 
 
 def _update_strip(
-    own: Array, inverses: list[Array], coupling: Array | None, update: Array, first: int
+    own: Array, signs: Array, coupling: Array | None, update: Array, first: int
 ) -> None:
     """Fill a strip of a front's update: what eliminating its own rows takes off the rows beyond.
 
     Parameters
     ----------
-    own, inverses
+    own, signs
         Of `_eliminate_panels`.
     coupling
-        The inverses times the own rows' columns beyond become this, a strip of columns after the
+        The own rows' columns beyond, times the signs, become this, a strip of columns after the
         other.
     update
         Upper triangle of a symmetric matrix: strips of rows, each a rectangle that begins at its
@@ -184,16 +194,15 @@ def _update_strip(
     b = beyond.shape[1]
     last = min(first + STRIP, b)
     if coupling is None:
-        scaled = np.empty((n, last - first), own.dtype)
+        turned = np.empty((n, last - first), own.dtype)
     else:
-        scaled = coupling[n * first : n * last].reshape(n, last - first)
-    for (start, stop), inverse in zip(panels_of(n), inverses, strict=True):
-        np.matmul(inverse, beyond[start:stop, first:last], out=scaled[start:stop])
+        turned = coupling[n * first : n * last].reshape(n, last - first)
+    np.multiply(signs[:, None], beyond[:, first:last], out=turned)
     place = packed_size(b) - packed_size(b - first)
     size = (last - first) * (b - first)
     rows = update[place : place + size].reshape(last - first, b - first)
     for start, stop in split(last - first, 1, PANEL):
-        np.matmul(scaled[:, start:stop].T, beyond[:, first + start :], out=rows[start:stop, start:])
+        np.matmul(turned[:, start:stop].T, beyond[:, first + start :], out=rows[start:stop, start:])
 
 
 @compiled
@@ -252,10 +261,3 @@ def _add_beyond(total, total_size, first, count, places, update):  # type: ignor
             for b in range(a, len(places)):
                 for j in range(3):
                     target[3 * (places[b] - count) + j - start] += source[3 * b + j - begin]
-
-
-@compiled
-def _mirror(matrix):  # type: ignore[no-untyped-def]
-    for row in range(len(matrix)):
-        for column in range(row):
-            matrix[row, column] = matrix[column, row]

@@ -1,9 +1,10 @@
 """Multifrontal factorisation of K - shift M, made for many right-hand sides at once.
 
-Every front is eliminated by panels of its own rows, which keep the inverse of their diagonal block
-and its product W with what couples them to later rows (Duff & Reid 1983, with inverted pivots).  A
-solve is then nothing but products of dense matrices; threads share the branches of the tree, and
-the fronts above them.  Each panel pivots within itself, so the matrix need not be definite.
+Every front is eliminated by panels of its own rows (Duff & Reid 1983).  Of its diagonal block A
+a panel keeps the root X of the inverse, A^-1 = X^T diag(s) X with signs s, and the product W of X
+with what couples it to later rows.  A solve is then nothing but products of dense matrices; threads
+share the branches of the tree, and the fronts above them.  Each panel pivots within itself, so the
+matrix need not be definite.
 """
 
 from collections.abc import Callable
@@ -66,7 +67,8 @@ class Factor:
         self.shift = shift
         self._pivots = np.empty(plan.pivot_offset[-1], dtype)
         self._coupling = np.empty(plan.coupling_offset[-1], dtype)
-        kept = self._pivots, self._coupling
+        self._signs = np.empty(plan.sign_offset[-1], dtype)
+        kept = self._pivots, self._coupling, self._signs
         self.negative, self.rest = eliminate_fronts(
             plan, stiffness, mass, shift, threads, kept, dtype
         )
@@ -148,7 +150,8 @@ class Factor:
         tree = shares.parts, shares.child_offset, shares.child, shares.taken_offset, shares.taken
         fronts = plan.fronts
         nodes = fronts.first, fronts.offset, fronts.order, shares.near, fronts.beyond
-        factor = self._pivots, plan.pivot_offset, self._coupling, plan.coupling_offset
+        pivots, coupling = (self._pivots, plan.pivot_offset), (self._coupling, plan.coupling_offset)
+        factor = *pivots, *coupling, self._signs
         arguments = *block, counters, tickets, tree, nodes, factor
         in_parallel(kernel, [arguments] * threads, threads)
 

@@ -55,9 +55,10 @@ class Plan:
         own = self.own_rows = 3 * np.diff(fronts.first)
         outside = self.outside_rows = 3 * np.diff(fronts.offset)
         self.pivot_offset = np.concatenate([[0], np.cumsum([pivot_entries(n) for n in own])])
+        self.sign_offset = 3 * fronts.first
         self.coupling_offset = np.concatenate([[0], np.cumsum(own * outside)])
         self.bytes_of_updates = int(8 * MEMORY_MARGIN * self._most_at_a_time(own, outside))
-        kept = self.pivot_offset[-1] + self.coupling_offset[-1]
+        kept = self.pivot_offset[-1] + self.coupling_offset[-1] + self.sign_offset[-1]
         self.bytes = 8 * int(kept) + self.bytes_of_updates
         self._work = 2 * own**2 + 4 * own * outside
         self.operations_of_solve = float(self._work.sum())

@@ -1,17 +1,18 @@
 """Elimination of a front that several ranks share, and its part in solves.
 
-The own rows are swept out (Goodnight 1979) a strip at a time, which leaves minus their inverse, the
-product of the inverse with what couples them to the rows beyond, and what the elimination leaves of
-these.  A solve then is products with dense rows, with two exchanges on the way up and one down.
+The own rows are eliminated a strip at a time. What is kept of them is the inverse of the triangle
+L of A = L diag(s) L^T, s being signs, and its product W with what couples them to the rows beyond.
+A solve then is products with dense rows, with two exchanges on the way up and one down.
 """
 
 import numpy as np
+from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import LocalConvergenceError
 from carillon.numerics.gemm import subtract_product
 from carillon.processes.threads import in_parallel
-from solver.linear.elimination import inverse_of
+from solver.linear.elimination import roots_of
 from solver.linear.shared_front import SharedFront
 
 
@@ -23,71 +24,78 @@ class SharedFactor:
     """
 
     def __init__(self, front: SharedFront, data: Array, threads: int = 1) -> None:
-        """Sweep out the own rows of the front whose strips are `data`; collective."""
+        """Eliminate the own rows of the front whose strips are `data`; collective."""
         self._front = front
         self.negative = 0
         self.failed = False
+        count = front.counts[front.comm.rank]
+        self._inverse = np.zeros((count, front.own))
+        self._coupling = np.empty((count, front.beyond))
+        self._signs = np.empty((count, 1))
+        strips, ranks = front.strips, front.comm.size
+        # Where this rank's strips of own rows begin among its rows.
+        self._first: dict[int, int] = {}
+        place = 0
+        for strip in range(front.comm.rank, front.panels, ranks):
+            first, stop = int(strips.bounds[strip]), int(strips.bounds[strip + 1])
+            self._first[strip] = place
+            rows = np.arange(stop - first)
+            self._inverse[place + rows, first + rows] = 1.0
+            place += stop - first
         for panel in range(front.panels):
-            self._sweep(data, panel, threads)
+            self._eliminate(data, panel, threads)
             if self.failed:
                 return
-        self._inverse, self._coupling = _rows_of_inverse(front, data)
+        self._inverse = np.ascontiguousarray(self._inverse[:, front.order])
 
-    def _sweep(self, data: Array, panel: int, threads: int) -> None:
+    def _eliminate(self, data: Array, panel: int, threads: int) -> None:
         strips = self._front.strips
-        first, stop = int(strips.bounds[panel]), int(strips.bounds[panel + 1])
-        column, inverse = self._column(data, panel)
-        self.failed = bool(np.isnan(inverse).any())
+        stop = int(strips.bounds[panel + 1])
+        later, inverse, signs = self._panel(data, panel)
+        self.failed = bool(np.isnan(signs).any())
         if self.failed:
             return
 
+        turned_later = np.ascontiguousarray(later.T)
+
         def update(strip: int) -> None:
-            rows = strips.of(data, strip)
-            if strip == panel:
-                rows[:, stop - first :] = inverse @ rows[:, stop - first :]
-                rows[:, : stop - first] = -inverse
-                return
             top, end = int(strips.bounds[strip]), int(strips.bounds[strip + 1])
-            scaled = column[top:end] @ inverse
-            subtract_product(rows, scaled, column[top:])
-            if strip < panel:
-                rows[:, first - top : stop - top] = scaled
+            turned = turned_later[top - stop : end - stop] * signs.T
+            subtract_product(strips.of(data, strip), turned, turned_later[top - stop :])
+            if strip in self._first:
+                place = self._first[strip]
+                self._inverse[place : place + end - top, :stop] -= turned @ inverse
 
-        in_parallel(update, [(strip,) for strip in strips.mine], threads)
+        in_parallel(update, [(strip,) for strip in strips.mine if strip > panel], threads)
 
-    def _column(self, data: Array, panel: int) -> tuple[Array, Array]:
-        """Columns (rows, w) of a panel, of all ranks, with zeros in its own rows; and its inverse.
+    def _panel(self, data: Array, panel: int) -> tuple[Array, Array, Array]:
+        """W of a panel (w, later rows), its rows of the inverse (w, rows so far) and signs (w, 1).
 
-        The inverse is not a number if a pivot is zero to rounding: all ranks go on, or none.
+        Its rank sends them to all. Signs are not numbers if a pivot is zero to rounding: all ranks
+        go on, or none.
         """
         front = self._front
         strips, comm = front.strips, front.comm
         first, stop = int(strips.bounds[panel]), int(strips.bounds[panel + 1])
         size, holder = stop - first, panel % comm.size
-        # Strips above have them in their columns, the panel's own in its rows.
-        rows = [np.flatnonzero(front.owner[:first] == rank) for rank in range(comm.size)]
-        rows[holder] = np.append(rows[holder], np.arange(first, strips.rows))
-        part = np.empty((len(rows[comm.rank]), size))
-        place = 0
-        for strip in range(comm.rank, panel, comm.size):
-            top = int(strips.bounds[strip])
-            here = strips.of(data, strip)[:, first - top : stop - top]
-            part[place : place + len(here)] = here
-            place += len(here)
+        packed = np.empty((size, strips.rows + 1))
+        later, inverse, signs = packed[:, 1 + stop :], packed[:, 1 : 1 + stop], packed[:, :1]
         if comm.rank == holder:
-            own = strips.of(data, panel)
+            own, place = strips.of(data, panel), self._first[panel]
+            mine = slice(place, place + size)
             try:
-                part[place : place + size], negative = inverse_of(own[:, :size])
-                self.negative += negative
+                root, signs[:, 0] = roots_of(own[:, :size])
             except LocalConvergenceError:
-                part[place : place + size] = np.nan
-            part[place + size :] = own[:, size:].T
-        gathered, column = np.empty((strips.rows, size)), np.empty((strips.rows, size))
-        comm.Allgatherv(part, (gathered, [len(each) * size for each in rows]))
-        column[np.concatenate(rows)] = gathered
-        inverse = column[first:stop].copy()
-        column[first:stop] = 0.0
-        return column, inverse
+                packed[:] = np.nan
+            else:
+                later[:] = root @ own[:, size:]
+                inverse[:] = root @ self._inverse[mine, :stop]
+                self.negative += int((signs < 0.0).sum())
+                self._inverse[mine, :stop] = inverse
+                self._coupling[mine] = signs * later[:, front.own - stop :]
+                self._signs[mine] = signs
+        comm.Bcast(packed, holder)
+        return later, inverse, signs
 
     def eliminate(self, rows: Array) -> tuple[Array, Array]:
         """First half of a solve: from this rank's part of the right-hand sides; collective.
@@ -110,8 +118,10 @@ class SharedFactor:
         for part in arrived[1:]:
             mine += part
         comm.Allgatherv(mine, (parts, sizes))
-        beyond = rows[own:] - self._coupling.T @ mine
-        return beyond, self._inverse @ parts
+        begun = self._inverse @ parts
+        beyond = rows[own:] - self._coupling.T @ begun
+        begun *= self._signs
+        return beyond, begun
 
     def substitute(self, begun: Array, beyond: Array) -> Array:
         """Second half of a solve: the solution (own + beyond, k); collective.
@@ -120,40 +130,9 @@ class SharedFactor:
         """
         front = self._front
         begun -= self._coupling @ beyond
-        gathered = np.empty((front.own, begun.shape[1]))
-        front.comm.Allgatherv(begun, (gathered, [n * begun.shape[1] for n in front.counts]))
+        gathered = np.ascontiguousarray(self._inverse.T @ begun)
+        front.comm.Allreduce(MPI.IN_PLACE, gathered)
         solution = np.empty((front.own + front.beyond, begun.shape[1]))
         solution[front.order] = gathered
         solution[front.own :] = beyond
         return solution
-
-
-def _rows_of_inverse(front: SharedFront, data: Array) -> tuple[Array, Array]:
-    """This rank's rows of the inverse, columns in the front's order, and of the coupling.
-
-    What is left of the diagonal lies right of it on other ranks, or on other strips of this one.
-    """
-    comm, strips, own = front.comm, front.strips, front.own
-    count = front.counts[comm.rank]
-    right, coupling = np.zeros((count, own)), np.empty((count, front.beyond))
-    place = 0
-    for strip in range(comm.rank, front.panels, comm.size):
-        top, stop = int(strips.bounds[strip]), int(strips.bounds[strip + 1])
-        rows, here = strips.of(data, strip), slice(place, place + stop - top)
-        right[here, top:] = -rows[:, : own - top]
-        # Their other half comes from the transposed matrix.
-        right[here, top:stop] *= 0.5
-        coupling[here] = rows[:, own - top :]
-        place = here.stop
-    inverse = np.ascontiguousarray(right[:, front.order])
-    del right
-    starts = np.cumsum([0, *front.counts])
-    parts = [inverse[:, starts[rank] : starts[rank + 1]] for rank in range(comm.size)]
-    packed, arrived = np.concatenate([part.ravel() for part in parts]), np.empty(count * own)
-    sizes = [count * other for other in front.counts]
-    comm.Alltoallv((packed, sizes), (arrived, sizes))
-    place = 0
-    for part, other in zip(parts, front.counts, strict=True):
-        part += arrived[place : place + count * other].reshape(other, count).T
-        place += count * other
-    return inverse, coupling

@@ -101,10 +101,11 @@ def up(  # type: ignore[no-untyped-def]
     fronts
         `Fronts.first`, `offset`, `order`, `Shares.near` and `Fronts.beyond`.
     factor
-        Inverse pivots with what couples panels, where those of each front begin, W, where that of
-        each front begins.
+        Roots of inverse pivots with what couples panels, where those of each front begin, W, where
+        that of each front begins, and signs of the own rows of all fronts.
     """
     outside = empty(_longest(tree, fronts) * lanes)
+    inside = empty(PANEL * lanes)
     order, parts = fronts[2], tree[0]
     taken = increase(counters, 0)
     while taken < len(tickets):
@@ -115,10 +116,11 @@ def up(  # type: ignore[no-untyped-def]
             beyond = 3 * parts[number, 3] * lanes
             work[beyond : beyond + 3 * parts[number, 4] * lanes] = 0.0
             for front in range(parts[number, 0], parts[number, 1]):
-                _eliminate(front, work, lanes, outside, fronts, factor)
+                _eliminate(front, work, lanes, inside, outside, fronts, factor)
         elif kind == PANEL_OF_FRONT:
+            columns = vectors, start, width
             _eliminate_panel(
-                vectors, start, width, number, begin, work, lanes, counters, tree, fronts, factor
+                columns, number, begin, work, lanes, inside, counters, tree, fronts, factor
             )
             increase(counters, 2 + COUNTERS * number)
         else:
@@ -135,16 +137,17 @@ def _bounds(n, panel):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _eliminate(front, work, lanes, outside, fronts, factor):  # type: ignore[no-untyped-def]
+def _eliminate(front, work, lanes, inside, outside, fronts, factor):  # type: ignore[no-untyped-def]
     """Take the own rows of a front of a branch off those beyond."""
     first, offset, _, near, _ = fronts
-    pivots, pivot_offset, coupling, coupling_offset = factor
+    pivots, pivot_offset, coupling, coupling_offset, _ = factor
     top = 3 * first[front]
     n = 3 * first[front + 1] - top
     place = pivot_offset[front]
     for panel in range(-(-n // PANEL)):
         start, stop = _bounds(n, panel)
         size, rest = stop - start, n - stop
+        _apply_root(pivots, place, size, False, work, top + start, lanes, inside)
         later = (pivots, place + size * size, 1, rest)
         subtract(later, rest, size, (work, top + start, lanes), (work, top + stop, lanes))
         place += size * (size + rest)
@@ -159,10 +162,11 @@ def _eliminate(front, work, lanes, outside, fronts, factor):  # type: ignore[no-
 
 @compiled
 def _eliminate_panel(  # type: ignore[no-untyped-def]
-    vectors, start, width, number, panel, work, lanes, counters, tree, fronts, factor
+    columns, number, panel, work, lanes, inside, counters, tree, fronts, factor
 ):
-    """Take the panels before off the rows of one of a shared front."""
-    parts, (pivots, pivot_offset, _, _) = tree[0], factor
+    """Take the panels before off the rows of one of a shared front, and apply its root."""
+    vectors, start, width = columns
+    parts, (pivots, pivot_offset, _, _, _) = tree[0], factor
     front = parts[number, 0]
     top = 3 * fronts[0][front]
     n = 3 * fronts[0][front + 1] - top
@@ -178,6 +182,7 @@ def _eliminate_panel(  # type: ignore[no-untyped-def]
         own, target = (work, top + begin, lanes), (work, top + first, lanes)
         subtract(later, last - first, size, own, target)
         place += size * (size + rest)
+    _apply_root(pivots, place, last - first, False, work, top + first, lanes, inside)
 
 
 @compiled
@@ -185,7 +190,7 @@ def _eliminate_slice(  # type: ignore[no-untyped-def]
     number, begin, end, work, lanes, counters, tree, fronts, factor
 ):
     """Take the own rows of a shared front off a slice of those beyond."""
-    parts, (_, _, coupling, coupling_offset) = tree[0], factor
+    parts, (_, _, coupling, coupling_offset, _) = tree[0], factor
     front = parts[number, 0]
     top, beyond = 3 * fronts[0][front], 3 * parts[number, 3]
     n = 3 * fronts[0][front + 1] - top
@@ -202,7 +207,7 @@ def _eliminate_slice(  # type: ignore[no-untyped-def]
 def down(  # type: ignore[no-untyped-def]
     vectors, start, width, work, lanes, counters, tickets, tree, fronts, factor
 ):
-    """Inverse pivots and backward sweep of the block of `up`, whose columns go to the vectors.
+    """Signs and backward sweep of the block of `up`, whose columns go to the vectors.
 
     See there for the parameters; `tickets` are `Shares.down`.
     """
@@ -244,37 +249,46 @@ def _copy_nodes(work, nodes, lanes, target):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _apply_pivot(pivots, place, size, work, row, lanes, inside):  # type: ignore[no-untyped-def]
-    """The rows of a panel become its inverse pivot times them."""
+def _apply_root(  # type: ignore[no-untyped-def]
+    pivots, place, size, transposed, work, row, lanes, inside
+):
+    """The rows of a panel become the root of its inverse pivot, or its transpose, times them."""
     inside[: size * lanes] = 0.0
-    subtract((pivots, place, size, 1), size, size, (work, row, lanes), (inside, 0, lanes))
+    across, along = (1, size) if transposed else (size, 1)
+    subtract((pivots, place, across, along), size, size, (work, row, lanes), (inside, 0, lanes))
     work[row * lanes : (row + size) * lanes] = -inside[: size * lanes]
+
+
+@compiled
+def _apply_signs(signs, first, size, lanes, work):  # type: ignore[no-untyped-def]
+    """The own rows from `first` on become themselves times the signs."""
+    for row in range(first, first + size):
+        if signs[row] < 0.0:
+            work[row * lanes : (row + 1) * lanes] = -work[row * lanes : (row + 1) * lanes]
 
 
 @compiled
 def _substitute(front, work, lanes, inside, outside, fronts, factor):  # type: ignore[no-untyped-def]
     """Solution for the own rows of a front of a branch."""
     first, offset, _, _, positions = fronts
-    pivots, pivot_offset, coupling, coupling_offset = factor
+    pivots, pivot_offset, coupling, coupling_offset, signs = factor
     top = 3 * first[front]
     n = 3 * first[front + 1] - top
     rows = positions[offset[front] : offset[front + 1]]
     _copy_nodes(work, rows, lanes, outside)
-    place = pivot_offset[front]
-    for panel in range(-(-n // PANEL)):
-        start, stop = _bounds(n, panel)
-        _apply_pivot(pivots, place, stop - start, work, top + start, lanes, inside)
-        place += (stop - start) * (n - start)
+    _apply_signs(signs, top, n, lanes, work)
     for start in range(0, 3 * len(rows), STRIP):
         size = min(STRIP, 3 * len(rows) - start)
         strip = (coupling, coupling_offset[front] + n * start, size, 1)
         subtract(strip, n, size, (outside, start, lanes), (work, top, lanes))
+    place = pivot_offset[front + 1]
     for panel in range(-(-n // PANEL) - 1, -1, -1):
         start, stop = _bounds(n, panel)
         size, rest = stop - start, n - stop
         later = (pivots, place - size * rest, rest, 1)
         subtract(later, size, rest, (work, top + stop, lanes), (work, top + start, lanes))
         place -= size * (size + rest)
+        _apply_root(pivots, place, size, True, work, top + start, lanes, inside)
 
 
 @compiled
@@ -282,7 +296,7 @@ def _substitute_panel(  # type: ignore[no-untyped-def]
     number, panel, work, lanes, inside, counters, tree, fronts, factor
 ):
     """Solution for a panel of a shared front, once that of the panels after it is known."""
-    parts, (pivots, pivot_offset, coupling, coupling_offset) = tree[0], factor
+    parts, (pivots, pivot_offset, coupling, coupling_offset, signs) = tree[0], factor
     front, beyond, count = parts[number, 0], 3 * parts[number, 3], 3 * parts[number, 4]
     top = 3 * fronts[0][front]
     n = 3 * fronts[0][front + 1] - top
@@ -291,7 +305,7 @@ def _substitute_panel(  # type: ignore[no-untyped-def]
     for before in range(panel):
         begin, stop = _bounds(n, before)
         place += (stop - begin) * (n - begin)
-    _apply_pivot(pivots, place, size, work, top + first, lanes, inside)
+    _apply_signs(signs, top + first, size, lanes, work)
     panels = parts[number, 5]
     wait_for(counters, 3 + COUNTERS * number, parts[number, 7] - panels)
     own = (work, top + first, lanes)
@@ -304,3 +318,4 @@ def _substitute_panel(  # type: ignore[no-untyped-def]
         begin, stop = _bounds(n, after)
         later = (pivots, place + size * size + begin - last, n - last, 1)
         subtract(later, size, stop - begin, (work, top + begin, lanes), own)
+    _apply_root(pivots, place, size, True, work, top + first, lanes, inside)
