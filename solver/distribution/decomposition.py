@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Index
 from carillon.fem.model import Solid
+from solver.distribution.graph_halves import cut_graph
 from solver.distribution.halves import cut_by_planes
+from solver.distribution.node_graph import graph_of_cells
 from solver.distribution.partition import default_subdomains, partition_model
 from solver.distribution.planes import lattice_of
 from solver.distribution.tree import MergeTree, assign_ranks, build_tree, tree_of_halves
@@ -77,8 +79,14 @@ def decompose_by_planes(model: Solid, ranks: int) -> tuple[Decomposition, Index]
     `decompose` does. Raises UserError if there are more ranks than nodes.
     """
     mesh, elements = model.mesh, model.elements
-    lattice = lattice_of(mesh.nodes, mesh.origin, elements.edge)
-    order, offsets = _rows(cut_by_planes(lattice, ranks, elements.steps), ranks)
+    lattice = lattice_of(model.positions, mesh.origin, elements.edge)
+    if elements.steps is not None:
+        part = cut_by_planes(lattice, ranks, elements.steps)
+    else:
+        cells, count = model.connectivity.astype(np.int64), len(lattice)
+        indptr, indices, _ = graph_of_cells(cells, count, count)
+        part = cut_graph(lattice, indptr, indices, ranks)
+    order, offsets = _rows(part, ranks)
     return Decomposition(tree_of_halves(ranks), np.arange(ranks, dtype=np.int32), offsets), order
 
 

@@ -6,7 +6,9 @@ they lie in a compact body than where they lie in its ears.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,48 +30,58 @@ FEW = 500
 """Nodes of a region that is not cut further to estimate its work."""
 
 
-def cut_by_planes(lattice: Index, parts: int, steps: int = 1) -> NDArray[np.int32]:
-    """Part (n,) of each node, by its integer coordinates (n, 3).
+class NodesToHalve(Protocol):
+    """Nodes that are to be halved."""
+
+    def __len__(self) -> int: ...
+
+    def beyond(self, share: float, fewest: tuple[int, int]) -> Index:
+        """Nodes of the second half, where the first has about this share of them.
+
+        A half has `fewest` nodes at least.
+        """
+
+    def works(self, second: Index) -> tuple[float, float]:
+        """Products of eliminating the first half and the second, about."""
+
+
+def cut_in_parts(
+    count: int, parts: int, body_of: Callable[[Index], NodesToHalve]
+) -> NDArray[np.int32]:
+    """Part (count,) of each node.
 
     Parts are halves of halves, see `groups_of`, and have equal work, about. Raises UserError if
     there are more parts than nodes.
 
     Parameters
     ----------
-    lattice, steps
-        See `solver.linear.dissection.dissect`.
-
-    Examples
-    --------
-    >>> cut_by_planes(np.array([[0, 0, 0], [3, 0, 0], [1, 0, 0], [2, 0, 0]]), 2)
-    array([0, 1, 0, 1], dtype=int32)
+    count
+        Number of nodes.
+    body_of
+        Body of some ascending nodes, which are counted from 0 in it.
     """
-    if parts > len(lattice):
-        raise UserError(
-            f"{parts} ranks for {len(lattice)} nodes: every rank needs one; start fewer ranks"
-        )
-    part = np.zeros(len(lattice), dtype=np.int32)
+    if parts > count:
+        raise UserError(f"{parts} ranks for {count} nodes: every rank needs one; start fewer ranks")
+    part = np.zeros(count, dtype=np.int32)
     # A part is the number of its first rank until it is halved.
     for group in reversed(list(groups_of(0, parts))):
         nodes = np.flatnonzero(part == group.first)
-        part[nodes[_second_half(lattice[nodes], group, steps)]] = group.middle
+        part[nodes[_second_half(body_of(nodes), group)]] = group.middle
     return part
 
 
-def _second_half(lattice: Index, group: RankGroup, steps: int) -> Index:
+def _second_half(body: NodesToHalve, group: RankGroup) -> Index:
     """Nodes of the second half of a group's ranks."""
     ranks = group.middle - group.first, group.stop - group.middle
-    axes = [_Axis.of(lattice, axis) for axis in range(3)]
-    best = tried = _beyond(axes, ranks[0] / sum(ranks), ranks)
-    if len(lattice) <= 2 * FEW:
+    best = tried = body.beyond(ranks[0] / sum(ranks), ranks)
+    if len(body) <= 2 * FEW:
         return best
     # Logarithms of the ratio of the halves' nodes, and of their work for each rank.
     low, high, least = (-np.inf, -np.inf), (np.inf, np.inf), np.inf
     for _ in range(TRIES):
-        first = np.setdiff1d(np.arange(len(lattice)), tried)
-        halves = lattice[first], lattice[tried]
-        works = [elimination_work(*each, steps) for each in (halves, halves[::-1])]
-        here = np.log(len(first) / len(tried)), np.log(works[0] * ranks[1] / works[1] / ranks[0])
+        works = body.works(tried)
+        sizes = len(body) - len(tried), len(tried)
+        here = np.log(sizes[0] / sizes[1]), np.log(works[0] * ranks[1] / works[1] / ranks[0])
         if abs(here[1]) < least:
             best, least = tried, abs(here[1])
         if least < EVEN:
@@ -82,8 +94,48 @@ def _second_half(lattice: Index, group: RankGroup, steps: int) -> Index:
             odds = low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
         else:
             odds = here[0] - here[1] / GROWTH
-        tried = _beyond(axes, 1.0 / (1.0 + np.exp(-odds)), ranks)
+        last, tried = tried, body.beyond(1.0 / (1.0 + np.exp(-odds)), ranks)
+        if np.array_equal(tried, last):
+            break  # as would all that follow
     return best
+
+
+def cut_by_planes(lattice: Index, parts: int, steps: int = 1) -> NDArray[np.int32]:
+    """Part (n,) of each node, by its integer coordinates (n, 3); see `cut_in_parts`.
+
+    Parameters
+    ----------
+    lattice, steps
+        See `solver.linear.dissection.dissect`.
+
+    Examples
+    --------
+    >>> cut_by_planes(np.array([[0, 0, 0], [3, 0, 0], [1, 0, 0], [2, 0, 0]]), 2)
+    array([0, 1, 0, 1], dtype=int32)
+    """
+    return cut_in_parts(len(lattice), parts, lambda nodes: _Lattice(lattice[nodes], steps))
+
+
+class _Lattice:
+    """Nodes on a lattice, whose planes `steps` apart separate elements."""
+
+    def __init__(self, lattice: Index, steps: int) -> None:
+        self._lattice, self._steps = lattice, steps
+        self._axes = [_Axis.of(lattice, axis) for axis in range(3)]
+
+    def __len__(self) -> int:
+        return len(self._lattice)
+
+    def beyond(self, share: float, fewest: tuple[int, int]) -> Index:
+        return _beyond(self._axes, share, fewest)
+
+    def works(self, second: Index) -> tuple[float, float]:
+        first = np.setdiff1d(np.arange(len(self)), second)
+        halves = self._lattice[first], self._lattice[second]
+        return (
+            elimination_work(*halves, self._steps),
+            elimination_work(*halves[::-1], self._steps),
+        )
 
 
 @dataclass(frozen=True)
@@ -133,22 +185,31 @@ def elimination_work(lattice: Index, others: Index, steps: int = 1) -> float:
     regions, work = [(lattice, _near(others, lattice, 1))], 0.0
     while regions:
         nodes, around = regions.pop()
-        beyond = 3.0 * len(around)
         axis, value = -1, 0
         if len(nodes) > FEW:
             axis, value = best_plane(nodes, np.arange(len(nodes)), steps)
         if axis < 0:
-            # As in a cube, whose plane has so many unknowns.
-            plane = 3.0 * len(nodes) ** (2.0 / 3.0)
-            work += 2.0 * plane**3 + plane * beyond**2
+            work += work_of_few(len(nodes), len(around))
             continue
         own = nodes[nodes[:, axis] == value]
-        rows = 3.0 * len(own)
-        work += rows**3 / 3.0 + rows**2 * beyond + rows * beyond**2
+        work += work_of_front(len(own), len(around))
         near = np.concatenate([around, own])
         for half in (nodes[nodes[:, axis] < value], nodes[nodes[:, axis] > value]):
             regions.append((half, _near(near, half, steps)))
     return work
+
+
+def work_of_front(own: int, around: int) -> float:
+    """Products of eliminating the `own` nodes of a front, which are coupled to those `around`."""
+    rows, beyond = 3.0 * own, 3.0 * around
+    return rows**3 / 3.0 + rows**2 * beyond + rows * beyond**2
+
+
+def work_of_few(nodes: int, around: int) -> float:
+    """Products of eliminating the nodes of a region that is not cut further, about."""
+    # As in a cube, whose plane has so many unknowns.
+    plane = 3.0 * nodes ** (2.0 / 3.0)
+    return 2.0 * plane**3 + plane * (3.0 * around) ** 2
 
 
 def _near(nodes: Index, others: Index, steps: int) -> Index:

@@ -180,7 +180,7 @@ def _scatter(
         start, stop = decomposition.local_range(rank)
         nodes = order[start:stop].copy()
         numbers = cell[first[rank] : first[rank + 1]].copy()
-        return nodes, model.mesh.nodes[nodes], numbers, whole.take(numbers)
+        return nodes, model.positions[nodes], numbers, whole.take(numbers)
 
     sent = []
     for rank in range(1, comm.size):

@@ -10,7 +10,13 @@ from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
 from carillon.fem.aggregation import levels_of
 from carillon.fem.geometry import HexMesh
-from carillon.fem.laplacian import FEW_CELLS, cell_laplacian, laplacian_modes, rough_modes
+from carillon.fem.laplacian import (
+    FEW_CELLS,
+    CellGraph,
+    cell_laplacian,
+    laplacian_modes,
+    rough_modes,
+)
 from carillon.fem.model import Solid
 from carillon.processes.threads import one_thread
 
@@ -40,7 +46,7 @@ def default_subdomains(n_dofs: int) -> int:
     return max(FEWEST_SUBDOMAINS, round(n_dofs / SUBDOMAIN_DOFS))
 
 
-def partition_cells(mesh: HexMesh, parts: int, seed: int = 0) -> NDArray[np.int32]:
+def partition_cells(mesh: HexMesh | CellGraph, parts: int, seed: int = 0) -> NDArray[np.int32]:
     """Subdomain (m,) of each cell, by k-means++ in the space of Laplacian eigenvectors."""
     if not 1 <= parts <= mesh.n_cells:
         raise UserError(
@@ -84,7 +90,7 @@ def _clusters(points: Array, count: int, seed: int) -> NDArray[np.integer]:
     return np.asarray(kmeans.fit_predict(points))
 
 
-def _refined_clusters(mesh: HexMesh, count: int, seed: int) -> NDArray[np.integer]:
+def _refined_clusters(mesh: HexMesh | CellGraph, count: int, seed: int) -> NDArray[np.integer]:
     """Cluster (m,) of each cell of a large mesh, found on a coarse graph of the cells first.
 
     There are the eigenvectors and the clusters; on finer graphs both are but smoothed.
@@ -125,8 +131,8 @@ def partition_model(model: Solid, parts: int, seed: int = 0) -> NDArray[np.int32
 
     Raises UserError if there are more parts than cells.
     """
-    cells, n_nodes = model.connectivity, model.mesh.n_nodes
-    node_part = partition_nodes(cells, n_nodes, partition_cells(model.hexmesh, parts, seed))
+    cells, n_nodes = model.connectivity, model.n_nodes
+    node_part = partition_nodes(cells, n_nodes, partition_cells(model.graph, parts, seed))
     return connect_subdomains(cells, node_part, n_nodes / (2.0 * parts))
 
 

@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Flags
+from carillon.arrays import Array, Flags, Index
 
 Indices = NDArray[np.integer]
 
@@ -25,16 +25,13 @@ INTERFACES = ("overlapping", "free", "fixed")
 DEFAULT_INTERFACE = "overlapping"
 
 _RANK_TOLERANCE = 1e-12
-_NON_COLLINEAR = 3
 
 
-def restrict_stiffness(
-    stiffness: Array, inside: Flags, interface: str, collinear: Flags | None = None
-) -> Array:
+def restrict_stiffness(stiffness: Array, inside: Flags, interface: str, places: Index) -> Array:
     """Element stiffness (c, 3 k, 3 k) restricted to the nodes `inside` (c, k); others are zero.
 
-    Restricting to all nodes returns the element itself; to none, zero. `collinear` (c,) elements
-    may have three nodes on a line.
+    Restricting to all nodes returns the element itself; to none, zero. `places` (c, k, 3) are those
+    of the nodes, see `Elements.node_places`. Raises ValueError for an unknown interface.
     """
     if interface not in INTERFACES:
         raise ValueError(f"interface {interface!r}, expected one of {INTERFACES}")
@@ -45,9 +42,7 @@ def restrict_stiffness(
     corners, every = inside.sum(axis=1), inside.shape[1]
     restricted[corners == every] = stiffness[corners == every]
     # Nodes on a line leave the element free to turn about it.
-    turns = corners < _NON_COLLINEAR
-    if collinear is not None:
-        turns |= collinear & (corners == _NON_COLLINEAR)
+    turns = on_a_line(places, inside)
     # One node alone has no stiffness of its own.
     for count, turning in product(range(2, every), (False, True)):
         chosen = np.flatnonzero((corners == count) & (turns == turning))
@@ -58,6 +53,16 @@ def restrict_stiffness(
             schur = _schur(stiffness, chosen, kept, relaxed, turning)
             restricted[chosen[:, None, None], kept[:, :, None], kept[:, None, :]] = schur
     return restricted
+
+
+def on_a_line(places: Index, inside: Flags) -> Flags:
+    """Whether the nodes `inside` (c, k) each element, at `places` (c, k, 3), lie on one line."""
+    element = np.arange(len(inside))
+    apart = places - places[element, inside.argmax(axis=1)][:, None]
+    apart[~inside] = 0
+    farthest = np.abs(apart).sum(axis=2).argmax(axis=1)
+    along = apart[element, farthest][:, None]
+    return ~np.cross(apart, along).any(axis=(1, 2))
 
 
 def _schur(

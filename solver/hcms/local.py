@@ -41,10 +41,10 @@ class Region:
     """(n,) number of the piece that each node belongs to, if there are several."""
 
     @classmethod
-    def of_cells(cls, corners: Index, lattice: Index, steps: int) -> Region:
+    def of_cells(cls, corners: Index, lattice: Index, steps: int | None) -> Region:
         """Region of the nodes 0..n-1 at `lattice` (n, 3) among the corners of cells.
 
-        Cells span `steps` of the lattice, see `Elements`.
+        Cells span `steps` of the lattice, see `Elements.steps`.
         """
         pattern = Pattern.of_cells(corners, 0, len(lattice), ghosts=False)
         graph = (np.ones(len(pattern.columns)), pattern.columns, pattern.indptr)
@@ -103,7 +103,7 @@ class Subdomain:
         alone = NodeRows(self.pattern)
         alone.add(
             slice(None),
-            restrict_stiffness(stiffness, self.inside, self.treatment, elements.collinear),
+            restrict_stiffness(stiffness, self.inside, self.treatment, elements.node_places),
             restrict_mass(mass, self.inside),
         )
         size = 3 * self.pattern.stop

@@ -111,11 +111,11 @@ def interface(cells: Cells, start: int, middle: int, stop: int, treatment: str) 
     order = np.lexsort((cells.elements.sort_key[straddling], *cells.corners[straddling].T[::-1]))
     straddling = straddling[order]
     left, right, cells = left[straddling], right[straddling], cells.take(straddling)
-    element, collinear = cells.elements.stiffness(), cells.elements.collinear
+    element, places = cells.elements.stiffness(), cells.elements.node_places
     stiffness = (
-        restrict_stiffness(element, left | right, treatment, collinear)
-        - restrict_stiffness(element, left, treatment, collinear)
-        - restrict_stiffness(element, right, treatment, collinear)
+        restrict_stiffness(element, left | right, treatment, places)
+        - restrict_stiffness(element, left, treatment, places)
+        - restrict_stiffness(element, right, treatment, places)
     )
     across = left[:, :, None] & right[:, None, :]
     mass = cells.elements.nodal_mass() * (across | across.transpose(0, 2, 1))

@@ -1,19 +1,23 @@
-"""Nested dissection of the nodes of a voxel mesh by planes (George 1973), and its symbolic fronts.
+"""Nested dissection of the nodes of a mesh by planes (George 1973), and its symbolic fronts.
 
-A plane of nodes between elements separates those on its two sides.  Cutting recursively gives a
-tree of fronts: the nodes of a plane are eliminated after everything that they separate.
+A plane of nodes between elements separates those on its two sides; where planes pass through
+elements, some nodes beside one do (`solver.distribution.cuts`).  Cutting recursively gives a tree
+of fronts: the nodes of a cut are eliminated after everything that they separate.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Index
+from solver.distribution.cuts import ABOVE, BELOW, BETWEEN, halves
 from solver.distribution.planes import best_plane, divided
+from solver.distribution.quotient import Quotient, pieces_of
 from solver.linear import symbolic
 
 LEAF_NODES = 48
@@ -112,7 +116,7 @@ def dissect(
     lattice: Index,
     indptr: Index,
     indices: Index,
-    steps: int = 1,
+    steps: int | None = 1,
     leaf_nodes: int = LEAF_NODES,
     inside: Index | None = None,
     kept: Index | None = None,
@@ -124,9 +128,10 @@ def dissect(
     lattice
         (n, 3) integer coordinates of the nodes.
     indptr, indices
-        Graph of the nodes in compressed rows: which nodes share an element.
+        Graph of the nodes in compressed rows, which ascend: which nodes share an element.
     steps
-        Planes of the lattice that far apart, from zero on, separate the elements between them.
+        Planes of the lattice that far apart, from zero on, separate the elements between them;
+        None if none do, so that the graph is cut.
     leaf_nodes
         Sets of at most this many nodes are not cut.
     inside
@@ -134,30 +139,55 @@ def dissect(
     kept
         Nodes that are not eliminated, in the order in which others will.
     """
-    owns: list[Index] = []
-    parent: list[int] = []
     inside = np.arange(len(lattice)) if inside is None else inside
-    if len(inside):
-        _cut(lattice, inside, steps, leaf_nodes, owns, parent)
-    order = np.concatenate([inside[:0], *owns])
-    first = np.concatenate([[0], np.cumsum([len(own) for own in owns], dtype=np.int64)])
-    above = np.array(parent, dtype=np.int64)
+    tree = _Tree([], [])
+    if len(inside) and steps is not None:
+        _cut(lattice, inside, steps, leaf_nodes, tree)
+    elif len(inside):
+        quotient = Quotient.of_graph(lattice, indptr, indices, inside)
+        _cut_graph(quotient, np.arange(len(quotient)), leaf_nodes, tree)
+    order = np.concatenate([inside[:0], *tree.owns])
+    first = np.concatenate([[0], np.cumsum([len(own) for own in tree.owns], dtype=np.int64)])
+    above = np.array(tree.parent, dtype=np.int64)
     return Fronts.of_order(order, first, above, indptr, indices, kept)
 
 
-def _cut(
-    lattice: Index, nodes: Index, steps: int, leaf_nodes: int, owns: list[Index], parent: list[int]
-) -> int:
-    """Append the fronts of `nodes`, children first; returns the number of the last, their root."""
+class _Tree(NamedTuple):
+    """Fronts as they are found, children first."""
+
+    owns: list[Index]
+    """What each front eliminates."""
+    parent: list[int]
+
+    def append(self, own: Index, children: list[int]) -> int:
+        """Append a front; returns its number."""
+        self.owns.append(own)
+        self.parent.append(-1)
+        for child in children:
+            self.parent[child] = len(self.owns) - 1
+        return len(self.owns) - 1
+
+
+def _cut(lattice: Index, nodes: Index, steps: int, leaf_nodes: int, tree: _Tree) -> int:
+    """Append the fronts of `nodes`; returns the number of the last, their root."""
     axis, value = best_plane(lattice, nodes, steps) if len(nodes) > leaf_nodes else (-1, 0)
-    children = []
-    own = nodes
-    if axis >= 0:
-        own, *sides = divided(lattice, nodes, axis, value)
-        for side in sides:
-            children.append(_cut(lattice, side, steps, leaf_nodes, owns, parent))
-    owns.append(own)
-    parent.append(-1)
-    for child in children:
-        parent[child] = len(owns) - 1
-    return len(owns) - 1
+    if axis < 0:
+        return tree.append(nodes, [])
+    own, *sides = divided(lattice, nodes, axis, value)
+    return tree.append(own, [_cut(lattice, side, steps, leaf_nodes, tree) for side in sides])
+
+
+def _cut_graph(quotient: Quotient, groups: Index, leaf_nodes: int, tree: _Tree) -> int:
+    """Append the fronts of some groups of nodes; returns the number of the last, their root."""
+    sizes, nodes = quotient.sizes[groups], quotient.nodes_of(groups)
+    if len(nodes) <= leaf_nodes:
+        return tree.append(nodes, [])
+    graph = quotient.part(groups)
+    piece, count = pieces_of(*graph)
+    if count > 1:
+        own, sides = nodes[:0], [groups[piece == number] for number in range(count)]
+    else:
+        side = halves(quotient.lattice[groups], sizes, *graph)
+        own = quotient.nodes_of(groups[side == BETWEEN])
+        sides = [groups[side == each] for each in (BELOW, ABOVE) if (side == each).any()]
+    return tree.append(own, [_cut_graph(quotient, side, leaf_nodes, tree) for side in sides])
