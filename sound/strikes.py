@@ -9,6 +9,7 @@ import numpy as np
 from carillon.arrays import Array, Index, Surface
 from carillon.command_line.progress import say
 from carillon.errors import UserError
+from carillon.fem.geometry.walls import WallSize
 from solver.response.vertices import inward_normals
 
 OFF_SURFACE = 1e-3
@@ -160,7 +161,10 @@ def _shown(point: Array, unit: float) -> str:
 
 
 def struck_surface(
-    mesh: str, unit: float = 1.0, parts_of: Callable[[Array, Index], Index] | None = None
+    mesh: str,
+    unit: float = 1.0,
+    parts_of: Callable[[Array, Index], Index] | None = None,
+    wall: WallSize | None = None,
 ) -> Surface:
     """Surface of a mesh in metres, without edges above `LONGEST_EDGE` of its longest side.
 
@@ -168,13 +172,14 @@ def struck_surface(
     counts.
 
     The mesh's own vertices come first and keep their numbers; `carillon.fem.geometry.load_surface`
-    describes it and its unit.  Raises UserError if there is no such mesh.
+    describes it and its unit.  Of a `wall` it is both sides, and these vertices are on the outer
+    one. Raises UserError if there is no such mesh.
     """
     import trimesh
 
     from carillon.fem.geometry import load_surface
 
-    surface = load_surface(mesh, unit)
+    surface = load_surface(mesh, unit) if wall is None else wall.read(mesh, unit).skin
     side = longest_side(surface)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
     cut = _cut(vertices, faces, LONGEST_EDGE * side)

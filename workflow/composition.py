@@ -14,6 +14,7 @@ from carillon.composition.entries import (
     read_composition,
 )
 from carillon.fem.geometry import load_surface
+from carillon.fem.geometry.walls import WallSize
 from workflow.arguments import path_word
 from workflow.settings import described_by, mesh_of
 
@@ -32,11 +33,14 @@ def composition_of(config: Config, model: str) -> CompositionEntry:
 
 
 def surface_of(config: Config, model: str) -> Surface:
-    """Triangles [m] around a model."""
+    """Triangles [m] around a model; of a wall, both of its sides."""
     mesh = mesh_of(config, model)
     if describes_regions(mesh):
         return joined_surface(read_composition(mesh), mesh)
-    return load_surface(mesh, config["models"][model]["unit"])
+    entry = config["models"][model]
+    if entry["wall"] is None:
+        return load_surface(mesh, entry["unit"])
+    return WallSize(entry["wall"], entry["wall_side"]).read(mesh, entry["unit"]).skin
 
 
 def files_of(regions: str) -> list[str]:

@@ -149,7 +149,7 @@ def _marked(domain: ValueDomain, marks: tuple[Any, ...]) -> ValueDomain:
     for mark in marks:
         if isinstance(mark, str):
             domain = replace(domain, meaning=mark)
-        elif isinstance(mark, Check) and mark.before:
+        elif isinstance(mark, Check) and mark.before and not mark.besides:
             domain = replace(domain, kind=str, items=())
         elif isinstance(mark, OneOf):
             domain = replace(domain, choices=mark.names)

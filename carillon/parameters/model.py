@@ -62,13 +62,15 @@ class Check:
     """Marker in `Annotated[..., Check(function)]` of values that a function checks or converts.
 
     The function returns the value to take, and raises ValueError with the reason why there is none.
-    It is given what `Annotated` admits; with `before`, what was given; `alone`, the annotation does
-    not count: it may be of arrays or functions.
+    It is given what `Annotated` admits; with `before`, what was given, which is a text, or with
+    `besides`, a text or what the annotation admits; `alone`, the annotation does not count: it may
+    be of arrays or functions.
     """
 
     function: Callable[[Any], Any]
     before: bool = False
     alone: bool = False
+    besides: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, admit: GetCoreSchemaHandler) -> CoreSchema:
         from pydantic_core import core_schema

@@ -1,6 +1,7 @@
 """Annotations of the quantities that commands, files and calls share: limits, unit and meaning."""
 
-from typing import Annotated, TypeVar
+import re
+from typing import Annotated, Any, TypeVar
 
 from carillon.limits import DENSITIES, FEWEST_MODES, MODULI, POISSON, RESOLUTIONS, UNITS
 from carillon.parameters.model import Check, OneOf, Within
@@ -24,6 +25,11 @@ WORKERS_OF_CORE = 4
 """Processes or threads that one command may start for each core of a machine with more."""
 
 
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+"""Units of lengths in texts, in metres."""
+_LENGTH = re.compile(r"([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?) *([a-zµ]+)")
+
+
 def between(low: float, high: float) -> Within:
     """Mark of numbers within limits, both of them included."""
     return Within(ge=low, le=high)
@@ -45,6 +51,25 @@ def _bearable(workers: int) -> int:
             f"found {workers:,}, expected at most {most:,}, since {cores:,} cores are usable here"
         )
     return workers
+
+
+def _length(value: Any) -> Any:
+    """A length [m] from a text with a unit; what is no text as it is.
+
+    Examples
+    --------
+    >>> _length("0.8 mm"), _length(0.002)
+    (0.0008, 0.002)
+    """
+    if not isinstance(value, str):
+        return value
+    found = _LENGTH.fullmatch(value.strip())
+    if found is None or found[2] not in LENGTHS:
+        raise ValueError(
+            f"found {value!r}, expected a number of metres, or a length such as '0.8 mm' in one of "
+            f"{', '.join(LENGTHS)}"
+        )
+    return float(found[1]) * LENGTHS[found[2]]
 
 
 def _reachable(tolerance: float) -> float:
@@ -73,6 +98,8 @@ ShownName = Annotated[str, Within(min_length=1, max_length=100), Check(_printabl
 """A name that messages and pages show."""
 Positive = Annotated[float, Within(gt=0.0)]
 NonNegative = Annotated[float, Within(ge=0.0)]
+Length = Annotated[float, Within(gt=0.0, le=1e9), Check(_length, before=True, besides=True)]
+"""A length [m], or a text with a unit such as 0.8 mm."""
 Seed = Annotated[int, between(0, LARGEST), "seed of random numbers"]
 
 Mesh = Annotated[str, "either builtin:NAME or a mesh file"]
@@ -91,6 +118,16 @@ Components = Annotated[
     str,
     OneOf("error", "largest"),
     "either error, which rejects voxels in several pieces, or largest, which keeps one",
+]
+WallThickness = Annotated[
+    Length,
+    "thickness of a wall that follows the mesh, in place of what the mesh encloses: of finite "
+    "cells, as text with a unit, such as 0.8 mm, or as number [m]",
+]
+WallSide = Annotated[
+    str,
+    OneOf("about", "inside", "outside"),
+    "where the wall lies: half of it on each side of the mesh (about), or all on one",
 ]
 Density = Annotated[float, between(*DENSITIES), "mass density [kg/m^3]"]
 PoissonRatio = Annotated[float, Within(gt=POISSON[0], lt=POISSON[1]), "Poisson's ratio [1]"]

@@ -27,6 +27,7 @@ from carillon.fem.elasticity import DEFAULT_POISSON
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
+from carillon.fem.geometry.walls import WallSize
 from carillon.fem.materials import UNIFORM_YOUNG, young_modulus
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.fem.regions import DEFAULT_DENSITY, RegionOf, Regions
@@ -40,6 +41,8 @@ from carillon.parameters.quantities import (
     Number,
     PoissonRatio,
     Resolution,
+    WallSide,
+    WallThickness,
 )
 from dataset_gen.objectives import DEFAULT_OBJECTIVE, OBJECTIVES
 from solver.analysis.solid_surface import SolidSurface
@@ -55,6 +58,11 @@ if TYPE_CHECKING:  # Its import takes long.
 
 Held = TypeVar("Held", bound=Solid)
 DISCRETISATIONS = ("voxel", "finite-cell")
+WALL_OF_VOXELS = (
+    "found a wall of voxels, expected finite cells, which hold it as thick as it is; add "
+    "--discretisation finite-cell, in a file discretisation: finite-cell, or leave out the wall"
+)
+"""Reason for refusing a wall where it cannot be."""
 AUTO = "auto"
 """Name of the choice that is left to the program."""
 
@@ -82,6 +90,8 @@ class ProblemOptions:
         DEFAULT_OBJECTIVE, "fit objective for --coarsen fit"
     )
     discretisation: Discretisation = option("voxel")
+    wall: WallThickness | None = option(None, metavar="LENGTH")
+    wall_side: WallSide = option("about")
     unit: MetresPerUnit = option(1.0)
     fill: Fill = option("winding")
     components: Components = option("error")
@@ -105,6 +115,14 @@ class ProblemOptions:
         if self.coarsen == AUTO:
             suits = FOREST if self.discretisation == "voxel" else "none"
             object.__setattr__(self, "coarsen", suits)
+
+        if self.wall is not None and self.discretisation != "finite-cell":
+            raise ValueError(WALL_OF_VOXELS)
+
+    @property
+    def wall_size(self) -> WallSize | None:
+        """The wall that the solid is; None if it is what the mesh encloses."""
+        return None if self.wall is None else WallSize(self.wall, self.wall_side)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, for provenance."""
@@ -184,7 +202,7 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     """
     begin = time.perf_counter()
     if surface is None:
-        surface = SolidSurface.read(options.mesh, options.unit)
+        surface = SolidSurface.read(options.mesh, options.unit, options.wall_size)
     mesh, covering = discretised(surface, options)
     surface.doubt_unit()
     meshed = time.perf_counter()
@@ -253,7 +271,7 @@ def discretised(surface: SolidSurface, options: ProblemOptions) -> tuple[HexMesh
             from carillon.fem.finite_cells.build import covering  # Its import takes long.
 
             _require_nothing_for_voxels(options)
-            cells = covering(triangles, options.resolution, options.components, name)
+            cells = covering(surface.solid, options.resolution, options.components, name)
             return cells.cells.mesh, cells
         case other:
             raise UserError(

@@ -22,6 +22,8 @@ from carillon.parameters.quantities import (
     MetresPerUnit,
     PoissonRatio,
     Resolution,
+    WallSide,
+    WallThickness,
     between,
 )
 from carillon.parameters.sentences import ParameterError
@@ -69,6 +71,8 @@ class Project:
         "ddfem for voxels, and none for finite cells and regions of wood",
     )
     discretisation: Discretisation = option("voxel")
+    wall: WallThickness | None = option(None)
+    wall_side: WallSide = option("about")
     forest: File | None = option(
         None, "file of forests for ddfem, relative to the project; those of the package if null"
     )
@@ -136,7 +140,7 @@ class Project:
 
     def surface(self) -> Surface:
         """Surface that is struck, in metres; raises UserError if there is no such mesh."""
-        return struck_surface(self.solid.mesh, self.solid.unit)
+        return struck_surface(self.solid.mesh, self.solid.unit, wall=self.solid.wall_size)
 
     def strikes(self, surface: Surface) -> list[Strike]:
         """The targets' points on `surface`, which `Project.surface` made.

@@ -13,6 +13,7 @@ from carillon.composition.entries import RegionEntry, SolidFrame, SupportEntry
 from carillon.composition.places import Where
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import surface_name
+from carillon.fem.geometry.walls import WallSize
 from carillon.parameters.documents import parameters_from
 from solver.response.vertices import inward_normals
 from sound.strikes import longest_side, struck_surface
@@ -31,7 +32,7 @@ class PlacingProcess:
     """What the process for places of regions and supports does, on the surface read last."""
 
     def __init__(self) -> None:
-        self._read: tuple[str, float] | None = None
+        self._read: tuple[str, float, WallSize | None] | None = None
         self._surface: Surface
         self._inward: Array
 
@@ -40,14 +41,15 @@ class PlacingProcess:
         mesh: str,
         unit: float,
         rows: Mapping[str, Sequence[Row]],
+        wall: WallSize | None,
         folder: Path,
         number: int,
     ) -> tuple[bytes, Faults]:
         """See `composition`."""
-        if self._read != (mesh, unit):
-            surface = struck_surface(mesh, unit)
+        if self._read != (mesh, unit, wall):
+            surface = struck_surface(mesh, unit, wall=wall)
             self._inward = inward_normals(surface, np.asarray(surface.vertices, dtype=float))
-            self._surface, self._read = surface, (mesh, unit)
+            self._surface, self._read = surface, (mesh, unit, wall)
         frame = SolidFrame(mesh, self._surface, surface_name(mesh), unit, folder)
         return composition(frame, self._inward, rows, number)
 

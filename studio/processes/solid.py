@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from carillon.arrays import Array
 from carillon.composition.entries import CompositionEntry
+from carillon.fem.geometry.walls import WallSize
 from carillon.fem.model import Solid
 from carillon.processes.threads import one_thread
 from solver.analysis.modes import Modes
@@ -71,9 +72,9 @@ class SolidProcess:
         self._own: _Sounding | None = None
         self._fine: _Sounding | None = None
 
-    def read(self, mesh: str, unit: float, number: int) -> SurfaceNews:
-        """The surface of a mesh, whose message has a `number`."""
-        surface = struck_surface(mesh, unit)
+    def read(self, mesh: str, unit: float, wall: WallSize | None, number: int) -> SurfaceNews:
+        """The surface of a mesh, or both sides of its wall, whose message has a `number`."""
+        surface = struck_surface(mesh, unit, wall=wall)
         positions = np.asarray(surface.vertices, dtype=float)
         self._surface, self._inward = surface, inward_normals(surface, positions)
         faces = np.asarray(surface.faces)
@@ -299,9 +300,9 @@ class _Sounding:
     def pushed(self, model: Solid, elastic: Array, inward: Array) -> Array:
         """What unit impulses (V, 3) at all vertices push the modes (3 n, N) of a model by."""
         values: csr_matrix = self._values
-        if model.mesh.n_nodes != self.model.mesh.n_nodes:
+        if model.n_nodes != self.model.n_nodes:
             values = interpolation(model, self._vertices)
-        modes = elastic.reshape(model.mesh.n_nodes, 3, -1)
+        modes = elastic.reshape(model.n_nodes, 3, -1)
         return np.asarray(
             sum(inward[:, axis, None] * (values @ modes[:, axis]) for axis in range(3))
         )

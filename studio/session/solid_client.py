@@ -7,6 +7,7 @@ from typing import Any
 
 from carillon.errors import UserError
 from carillon.fem.geometry.surface import surface_name
+from carillon.fem.geometry.walls import WallSize
 from sound.project.project import Project
 from sound.strikes import Place, Strike
 from studio.processes.worker import Worker
@@ -56,7 +57,7 @@ class SolidClient:
         self.strikes: dict[str, Strike] = {}
         self.wanted: dict[str, Any] | None = None
         self.project: Project | None = None
-        self._read: tuple[str, float] | None = None
+        self._read: tuple[str, float, WallSize | None] | None = None
         self._prepared: Any = None
         self._aimed: Any = None
         self._placed: tuple[Target, ...] | None = None
@@ -94,7 +95,7 @@ class SolidClient:
         try:
             project = document.solid(self._folder)
             solid, material = project.solid, project.material
-            await self._bring_surface(document.mesh, solid.mesh, solid.unit)
+            await self._bring_surface(document.mesh, solid.mesh, solid.unit, solid.wall_size)
             await self._bring_voxels(solid, material, project.composition)
         except UserError as error:
             self._tell(phase="failed", message=str(error), progress=None)
@@ -107,15 +108,20 @@ class SolidClient:
         """Call the process, see `studio.processes.solid.SolidProcess`."""
         return await self._worker.call(name, *arguments)
 
-    async def _bring_surface(self, mesh: str, path: str, unit: float) -> None:
-        if self._read == (mesh, unit):
+    async def _bring_surface(
+        self, mesh: str, path: str, unit: float, wall: WallSize | None
+    ) -> None:
+        wanted = mesh, unit, wall
+        if self._read == wanted:
             return
         self._forget()
         self.news = SolidNews(mesh, surface_name(mesh), "reading")
         self._changed()
         self._numbers += 1
-        result = await self._worker.call("read", path, unit, self._numbers, seconds=READ_SECONDS)
-        self.surface, self._read = (self._numbers, result.message), (mesh, unit)
+        result = await self._worker.call(
+            "read", path, unit, wall, self._numbers, seconds=READ_SECONDS
+        )
+        self.surface, self._read = (self._numbers, result.message), wanted
         self._tell(
             surface=self._numbers,
             vertices=result.vertices,

@@ -19,7 +19,10 @@ SAVED_SECONDS = 2.0
 """Time within which a material that a search has found is saved."""
 Told = Callable[["StudioState"], dict[str, Any]]
 """Function that describes a state: to pages, or for the file of the session."""
-_OF_VOXELS = ("mesh", "unit", "resolution", "fill", "components", "discretisation")
+_OF_VOXELS = (
+    *("mesh", "unit", "resolution", "fill", "components", "discretisation"),
+    *("wall", "wall_side"),
+)
 """Keys of a project whose change makes other voxels, for which no former material is one."""
 _OF_COORDINATES = (
     "dimensions",

@@ -20,6 +20,8 @@ from carillon.parameters.quantities import (
     NumberOfModes,
     Resolution,
     Seed,
+    WallSide,
+    WallThickness,
 )
 from carillon.parameters.sentences import did_you_mean
 from workflow.configuration.section import File, Line, Several, Title
@@ -118,6 +120,8 @@ class ModelEntry(SolidEntry):
         "either voxel, cubes that are full or empty, or finite-cell, quadratic cells of which only "
         "what is inside counts, which are not coarsened",
     )
+    wall: WallThickness | None = option(None)
+    wall_side: WallSide = option("about")
     material: File = option(
         "smooth",
         f"one of {', '.join(MATERIALS)}, or a file with one modulus per voxel [Pa]",
@@ -156,3 +160,9 @@ class ModelEntry(SolidEntry):
     modes: ModelModes | None = option(
         None, "modes of this model, rigid ones included; solver.modes if null [1]"
     )
+
+    def __post_init__(self) -> None:
+        if self.wall is not None and self.discretisation == "voxel":
+            raise ValueError(
+                "found a wall of voxels, expected discretisation: finite-cell, or no wall"
+            )

@@ -267,9 +267,9 @@ def unknowns(mesh: str, resolution: int) -> float:
     """
     if not mesh.startswith(BUILTIN_PREFIX) and not Path(mesh).is_file():
         return TYPICAL * resolution**3
-    surface, counted = load_surface(mesh), min(resolution, COUNTED)
+    surface, counted = load_surface(mesh, is_sheet=True), min(resolution, COUNTED)
     try:
         voxels = voxelize(surface, counted, "winding", "largest", mesh)
-    except UserError:  # walls thinner than these voxels
+    except UserError:  # walls thinner than these voxels, or a surface that one follows
         return TYPICAL * resolution**3
     return float(hexmesh_from_voxels(voxels).n_dofs * (resolution / counted) ** 3)

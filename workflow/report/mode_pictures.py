@@ -134,7 +134,7 @@ def overview_figure(results: Run, model: str) -> Figure:
             figure.text(left + 0.01, 0.93, _label(variant), weight="bold", size=10.5)
             hertz = file.frequencies[file.model.rigid_modes]
             mode = file.model.rigid_modes + 1
-            text = f"{file.mesh.n_dofs:,} unknowns, mode {mode} at {hertz:,.0f} Hz"
+            text = f"{file.model.n_dofs:,} unknowns, mode {mode} at {hertz:,.0f} Hz"
             figure.text(left + 0.01, 0.87, text, color=MUTED)
         rows = [row for row in results.table("frequencies").rows if row["model"] == model]
         _plot_spectra(figure.add_axes((0.68, 0.13, 0.305, 0.69)), rows)

@@ -19,8 +19,8 @@ def _identity(run: Run, model: str) -> Row:
     spectra = run.spectra[model]
     return {
         **solid(run, model),
-        "unknowns": spectra[TRUTH].mesh.n_dofs,
-        **({"coarse_unknowns": spectra[FAST].mesh.n_dofs} if FAST in spectra else {}),
+        "unknowns": spectra[TRUTH].model.n_dofs,
+        **({"coarse_unknowns": spectra[FAST].model.n_dofs} if FAST in spectra else {}),
     }
 
 

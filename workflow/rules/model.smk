@@ -23,6 +23,8 @@ def model_arguments(wildcards, resolution=None):
     how = {
         "resolution": resolution or model["resolution"],
         "discretisation": model["discretisation"] if cells else None,
+        "wall": model["wall"],
+        "wall_side": model["wall_side"] if model["wall"] else None,
         "material": settings.material_of(config, wildcards.model),
         "poisson": config["poisson"],
         "regions": settings.regions_of(config, wildcards.model),

@@ -4,11 +4,16 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Flags, Index
 
 
 def line_crossings(
-    vertices: Array, faces: Index, rows: Array, columns: Array, axis: int
+    vertices: Array,
+    faces: Index,
+    rows: Array,
+    columns: Array,
+    axis: int,
+    requested: Flags | None = None,
 ) -> tuple[Index, Array, NDArray[np.int8]]:
     """Crossings of lines along an axis with the triangles of a surface.
 
@@ -24,6 +29,8 @@ def line_crossings(
     rows, columns
         Ascending coordinates of the lines along axis + 1 and axis + 2, modulo 3: line (i, j) has
         the number ``i * len(columns) + j``.
+    requested : (r, c)
+        Which lines are looked at: one for as many rows and columns each as there are; all if None.
 
     Returns
     -------
@@ -38,10 +45,14 @@ def line_crossings(
     points = np.ascontiguousarray(vertices[:, [(axis + 1) % 3, (axis + 2) % 3, axis]])
     counts = np.zeros(len(rows) * len(columns) + 1, dtype=np.int64)
     nothing = np.empty(0), np.empty(0, dtype=np.int8)
-    _cross(points, faces, rows, columns, counts[1:], *nothing, False)
+    if requested is None:
+        requested = np.ones((1, 1), dtype=bool)
+    every = len(rows) // requested.shape[0], len(columns) // requested.shape[1]
+    lines = rows, columns, np.ascontiguousarray(requested), every
+    _cross(points, faces, lines, counts[1:], *nothing, False)
     start = np.cumsum(counts)
     place, step = np.empty(start[-1]), np.empty(start[-1], dtype=np.int8)
-    _cross(points, faces, rows, columns, start[:-1].copy(), place, step, True)
+    _cross(points, faces, lines, start[:-1].copy(), place, step, True)
     _sort(start, place, step)
     return start, place, step
 
@@ -57,30 +68,38 @@ def _left(points, i, j, x, y):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _cross(  # type: ignore[no-untyped-def]
-    points, faces, rows, columns, fill, place, step, write
+    points, faces, lines, fill, place, step, write
 ):
     """Count the crossings of every line in `fill`, or write them to where `fill` says."""
+    rows, columns, requested, (every_row, every_column) = lines
     for face in range(len(faces)):
         i, j, k = faces[face]
         p, q, r = points[i], points[j], points[k]
         highest_x, highest_y = max(p[0], q[0], r[0]), max(p[1], q[1], r[1])
+        first_x = np.searchsorted(rows, min(p[0], q[0], r[0]))
+        last_x = np.searchsorted(rows, highest_x, side="right")
         first_y = np.searchsorted(columns, min(p[1], q[1], r[1]))
-        for row in range(np.searchsorted(rows, min(p[0], q[0], r[0])), len(rows)):
-            x = rows[row]
-            if x > highest_x:
-                break
-            for column in range(first_y, len(columns)):
-                y = columns[column]
-                if y > highest_y:
-                    break
-                left = _left(points, i, j, x, y)
-                if _left(points, j, k, x, y) != left or _left(points, k, i, x, y) != left:
+        last_y = np.searchsorted(columns, highest_y, side="right")
+        if first_x == last_x or first_y == last_y:
+            continue
+        for some_rows in range(first_x // every_row, (last_x - 1) // every_row + 1):
+            low_x, high_x = some_rows * every_row, (some_rows + 1) * every_row
+            for some in range(first_y // every_column, (last_y - 1) // every_column + 1):
+                if not requested[some_rows, some]:
                     continue
-                line = row * len(columns) + column
-                if write:
-                    place[fill[line]] = _height(p, q, r, x, y)
-                    step[fill[line]] = -1 if left else 1
-                fill[line] += 1
+                low_y, high_y = some * every_column, (some + 1) * every_column
+                for row in range(max(first_x, low_x), min(last_x, high_x)):
+                    x = rows[row]
+                    for column in range(max(first_y, low_y), min(last_y, high_y)):
+                        y = columns[column]
+                        left = _left(points, i, j, x, y)
+                        if _left(points, j, k, x, y) != left or _left(points, k, i, x, y) != left:
+                            continue
+                        line = row * len(columns) + column
+                        if write:
+                            place[fill[line]] = _height(p, q, r, x, y)
+                            step[fill[line]] = -1 if left else 1
+                        fill[line] += 1
 
 
 @numba.njit(cache=True, nogil=True)

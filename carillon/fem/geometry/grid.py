@@ -1,10 +1,9 @@
 """Cubes that a solid is put on."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-
-from carillon.arrays import Surface
 
 ROUNDED = 1e-3
 """Part of a voxel by which sides may exceed whole voxels: files round coordinates."""
@@ -19,7 +18,15 @@ class Grid:
     shape: tuple[int, int, int]
 
 
-def bounding_grid(surface: Surface, resolution: int) -> Grid:
+class HasBounds(Protocol):
+    """A surface, or what else has a box around it."""
+
+    @property
+    def bounds(self) -> np.ndarray | None:
+        """Lowest and highest corner (2, 3) [m]."""
+
+
+def bounding_grid(surface: HasBounds, resolution: int) -> Grid:
     """Grid with `resolution` voxels along the longest side of the bounding box, centred on it.
 
     Voxels are larger by as much as spares a layer of them for sides that exceed it by `ROUNDED`.

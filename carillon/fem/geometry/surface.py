@@ -37,7 +37,7 @@ number: archives (zip), parts that hold each other (dae), entities (xaml, dae).
 """
 
 
-def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
+def load_surface(mesh: str, unit: float = 1.0, is_sheet: bool = False) -> trimesh.Trimesh:
     """Load a triangle surface [m], its faces turned alike; it need not be closed or manifold.
 
     Raises UserError if the file is missing, not readable as a mesh, longer than `MESH_BYTES` with
@@ -55,6 +55,9 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
     unit
         Metres per unit of the mesh's coordinates; built-in objects are in metres already, so for
         them it is a scale factor.
+    is_sheet
+        Whether a wall is to follow it: it may then be flat, and its faces stay as they are if they
+        are there both ways or cannot be turned alike.
 
     Examples
     --------
@@ -67,9 +70,9 @@ def load_surface(mesh: str, unit: float = 1.0) -> trimesh.Trimesh:
         surface = builtin_surface(mesh.removeprefix(BUILTIN_PREFIX))
     else:
         surface = _read(Path(mesh))
-    _require_solid(mesh, surface, unit)
+    _require_solid(mesh, surface, unit, is_sheet)
     if not mesh.startswith(BUILTIN_PREFIX):
-        surface = _turned_alike(mesh, surface)
+        surface = _turned_alike(mesh, surface, is_sheet)
     if unit != 1.0:
         surface.apply_scale(unit)
     return surface
@@ -96,17 +99,19 @@ def parts_of_scene(mesh: str) -> list[Part] | None:
                 return gltf_parts(content, Beside(path).get, mesh)
 
 
-def surface_of_triangles(vertices: ArrayLike, faces: ArrayLike, name: str) -> trimesh.Trimesh:
+def surface_of_triangles(
+    vertices: ArrayLike, faces: ArrayLike, name: str, is_sheet: bool = False
+) -> trimesh.Trimesh:
     """A surface [m] of vertices (v, 3) and triangles (f, 3), checked as those of files are.
 
     Raises UserError if arrays have other shapes or faces name vertices that are not there, and for
     what `load_surface` refuses of coordinates and faces.
     """
-    return checked_surface(vertices, faces, name, 1.0)
+    return checked_surface(vertices, faces, name, 1.0, is_sheet)
 
 
 def checked_surface(
-    vertices: ArrayLike, faces: ArrayLike, name: str, unit: float
+    vertices: ArrayLike, faces: ArrayLike, name: str, unit: float, is_sheet: bool = False
 ) -> trimesh.Trimesh:
     """The same of vertices in a `unit` [m]."""
     _require_unit(unit)
@@ -117,8 +122,8 @@ def checked_surface(
         raise UserError(f"{name}: {error}") from None
     if not len(surface.faces):
         raise UserError(f"{name}: has no faces, expected the triangles of a surface")
-    _require_solid(name, surface, unit)
-    surface = _turned_alike(name, surface)
+    _require_solid(name, surface, unit, is_sheet)
+    surface = _turned_alike(name, surface, is_sheet)
     if unit != 1.0:
         surface.apply_scale(unit)
     return surface
@@ -236,13 +241,18 @@ def _require_vertices(surface: trimesh.Trimesh) -> None:
         raise ValueError(f"a face names vertex {strange[0]}, there are 0 to {count - 1}")
 
 
-def _turned_alike(mesh: str, surface: trimesh.Trimesh) -> trimesh.Trimesh:
+def _turned_alike(mesh: str, surface: trimesh.Trimesh, is_sheet: bool) -> trimesh.Trimesh:
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces, dtype=np.int64)
-    turned = turned_alike(vertices, faces, mesh)
+    try:
+        turned = turned_alike(vertices, faces, mesh)
+    except UserError:
+        if is_sheet:
+            return surface
+        raise
     return surface if turned is None else trimesh.Trimesh(vertices, turned, process=False)
 
 
-def _require_solid(mesh: str, surface: trimesh.Trimesh, unit: float) -> None:
+def _require_solid(mesh: str, surface: trimesh.Trimesh, unit: float, is_sheet: bool) -> None:
     used = np.asarray(surface.vertices)[np.unique(surface.faces)]
     bad = int(np.count_nonzero(~np.isfinite(used).all(axis=1)))
     if bad:
@@ -253,11 +263,11 @@ def _require_solid(mesh: str, surface: trimesh.Trimesh, unit: float) -> None:
     # Floats of Python, which become infinite in silence where numpy's warn.
     low, high = ([float(x) for x in end] for end in (used.min(axis=0), used.max(axis=0)))
     extents = [b - a for a, b in zip(low, high)]
-    if min(extents) <= FLATNESS * max(extents):
+    if min(extents) <= FLATNESS * max(extents) and not (is_sheet and max(extents) > 0.0):
         raise UserError(
             f"{mesh}: is flat, its bounding box measures "
             f"{' x '.join(f'{side:g}' for side in extents)}, expected a surface around a solid; "
-            f"give the object a thickness"
+            f"give the object a thickness, such as a wall with finite cells (--wall)"
         )
     longest, away = max(extents), max(map(abs, (*low, *high)))
     require_within(f"{mesh}: the longest side is {longest * unit:g} m", longest * unit, EXTENTS)
