@@ -35,6 +35,7 @@ from carillon.fem import materials
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, load_surface, surface_name, voxelize
 from carillon.fem.geometry.surface import surface_of_triangles
+from carillon.fem.geometry.walls import Wall, WallSize
 from carillon.fem.model import (
     DEFAULT_DENSITY,
     Constants,
@@ -56,6 +57,8 @@ from carillon.parameters.quantities import (
     Resolution,
     Seed,
     Tolerance,
+    WallSide,
+    WallThickness,
     Workers,
 )
 
@@ -83,7 +86,7 @@ SAMPLE_RATE = 44_100
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """The surface of a solid, in metres.
+    """The surface of a solid, or of what its wall follows, in metres.
 
     Examples
     --------
@@ -100,14 +103,32 @@ class Mesh:
     """File that it was read from, or `builtin:NAME`; empty if there is none."""
     unit: float = 1.0
     """Metres per unit of that file."""
+    wall: Wall | None = None
+    """The wall that the solid is, of finite cells; None if it is what the surface encloses."""
 
     @classmethod
-    def of_triangles(cls, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> Self:
+    def of_triangles(
+        cls,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        name: str = "mesh",
+        wall: float | str | None = None,
+        wall_side: str = "about",
+    ) -> Self:
         """The surface of vertices (v, 3) [m] and triangles (f, 3).
 
-        Raises UserError if it is no surface around a solid.
+        Raises UserError if it is no surface around a solid; for a wall see `load_mesh`.
+
+        Examples
+        --------
+        >>> corners = [[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]]
+        >>> sheet = ca.Mesh.of_triangles(corners, [[0, 1, 2], [0, 2, 3]], wall="4 mm")
+        >>> sheet.extents.tolist()
+        [0.2, 0.1, 0.004]
         """
-        return cls(surface_of_triangles(vertices, faces, name), name)
+        size = _wall_size(wall, wall_side)
+        surface = surface_of_triangles(vertices, faces, name, is_sheet=size is not None)
+        return cls(surface, name, wall=None if size is None else size.of(surface, name))
 
     @property
     def vertices(self) -> Array:
@@ -121,24 +142,48 @@ class Mesh:
 
     @property
     def extents(self) -> Array:
-        """Sides (3,) of the box around it [m]."""
-        return np.asarray(self.surface.extents)
+        """Sides (3,) of the box around the solid [m]."""
+        return np.asarray((self.wall or self.surface).extents)
+
+    @property
+    def skin(self) -> trimesh.Trimesh:
+        """Triangles around the solid [m]: the surface, or both sides of its wall, whose edges are
+        round but for here.
+        """
+        return self.surface if self.wall is None else self.wall.skin
 
     def hexahedra(self, resolution: int) -> HexMesh:
         """The voxels inside, `resolution` of them along the longest side.
 
-        Raises UserError if there can be no such voxels, or they do not hold together.
+        Raises UserError if there can be no such voxels, as of a wall, or they do not hold together.
         """
+        if self.wall is not None:
+            raise UserError("voxels hold no wall; take discretisation='finite-cell'")
         return hexmesh_from_voxels(voxelize(self.surface, resolution, name=self.name))
 
 
-def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
+def load_mesh(
+    path: str | Path,
+    unit: float = 1.0,
+    wall: float | str | None = None,
+    wall_side: str = "about",
+) -> Mesh:
     """The surface in a mesh file, or `builtin:NAME`.
 
     Files are OBJ, STL, PLY, OFF, glTF, 3MF, or of volume elements (Gmsh, VTU, Abaqus, ...).
 
-    Raises UserError if there is no such mesh, or it is no surface around a solid. `unit`: metres
-    per unit of the file.
+    Raises UserError if there is no such mesh, or it is no surface around a solid, or none that a
+    wall can follow.
+
+    Parameters
+    ----------
+    unit
+        Metres per unit of the file.
+    wall
+        Thickness of a wall that follows the surface, open or closed, in place of what it encloses:
+        a number [m], or a text such as `0.8 mm`. Walls are for finite cells.
+    wall_side
+        `about`, half of it on each side of the surface, or `inside` or `outside`.
 
     Examples
     --------
@@ -147,8 +192,18 @@ def load_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     """
     if not isinstance(path, str | Path):
         raise UserError(f"found {path!r:.80}, expected the path of a mesh file, or builtin:NAME")
-    metres = checked("unit", unit, MetresPerUnit)
-    return Mesh(load_surface(str(path), metres), surface_name(str(path)), str(path), metres)
+    metres, size = checked("unit", unit, MetresPerUnit), _wall_size(wall, wall_side)
+    name = surface_name(str(path))
+    surface = load_surface(str(path), metres, is_sheet=size is not None)
+    made = None if size is None else size.of(surface, name)
+    return Mesh(surface, name, str(path), metres, made)
+
+
+def _wall_size(wall: float | str | None, side: str) -> WallSize | None:
+    checked("wall_side", side, WallSide)
+    if wall is None:
+        return None
+    return WallSize(float(checked("wall", wall, WallThickness)), side)
 
 
 def _young(young: Young) -> Young:
@@ -357,7 +412,8 @@ class Solution:
     residuals: Array
     """(k,) `|K x - lambda M x| / (lambda |M x|)`."""
     shapes: Array | None
-    """(k, n, 3) mass-normalised displacements of nodes [kg^-1/2]; None on other ranks than 0."""
+    """(k, n, 3) mass-normalised displacements [kg^-1/2] of the nodes, which are at the solid's
+    `positions`; None on other ranks than 0."""
     solid: Solid | None
     """The solid, with the material that was solved; None on other ranks than 0."""
     evidence: dict[str, Any] = field(default_factory=dict)
@@ -365,7 +421,7 @@ class Solution:
 
     @property
     def mesh(self) -> HexMesh:
-        """Hexahedra and nodes of the solid."""
+        """Hexahedra of the solid, or the voxels that carry the material of finite cells."""
         return self._file().mesh
 
     def plot(self, mode: int) -> Figure:
@@ -376,6 +432,7 @@ class Solution:
         from matplotlib.figure import Figure
 
         from carillon.drawing.solid import draw
+        from solver.response.points import voxel_motion
 
         numbers = range(1, len(self.frequencies) + 1)
         if mode not in numbers:
@@ -385,7 +442,7 @@ class Solution:
         assert file.modes is not None
         figure = Figure(figsize=(6.0, 4.5), layout="constrained")
         axes = figure.add_subplot(projection="3d")
-        draw(axes, file.model.hexmesh, file.modes[:, index])
+        draw(axes, file.mesh, voxel_motion(file.model, file.modes[:, index]))
         axes.set_title(f"mode {mode}, {self.frequencies[index]:.4g} Hz")
         return figure
 
@@ -405,7 +462,7 @@ class Solution:
             )
 
     def to_vtu(self, path: str | Path) -> None:
-        """Write mesh, moduli and modes for ParaView; of finite cells the octants with material.
+        """Write mesh, moduli and modes for ParaView; of finite cells the voxels with material.
 
         Raises UserError if it cannot be written.
         """
@@ -435,6 +492,8 @@ def solve(
     comm: MPI.Comm | None = None,
     fix: str | Sequence[str] = (),
     supports: Sequence[SupportEntry] = (),
+    wall: float | str | None = None,
+    wall_side: str = "about",
     **options: Any,
 ) -> Solution:
     """Lowest modes of a solid; collective.
@@ -456,7 +515,7 @@ def solve(
     method
         `auto`, `lanczos`, `lobpcg` or `hcms`; ground truth by `slepc` or `arpack`.
     discretisation
-        `voxel`, or `finite-cell`: the solid as it is, by quadratic cells that its surface cuts.
+        `voxel`, or `finite-cell`: the solid as it is, by quartic cells that its surface cuts.
     initial
         Modes of a similar material on the same mesh, which are corrected.
     comm
@@ -466,6 +525,8 @@ def solve(
         one text or several.
     supports
         What else holds it, see `Support`.
+    wall, wall_side
+        Wall that follows the mesh of a file, see `load_mesh`; needs finite cells.
     options
         `tolerance`, `linear_solver` and the other options of `carillon modes`, with underscores.
 
@@ -487,13 +548,14 @@ def solve(
     from solver.distribution.collective import compute_on_root
 
     ranks = MPI.COMM_WORLD if comm is None else comm
-    how = (resolution, discretisation, fix, supports)
+    how = (resolution, discretisation, fix, supports, wall, wall_side)
     solid = compute_on_root(ranks, lambda: _solid(body, material, *how))
     start = compute_on_root(ranks, lambda: None if initial is None else _start(initial, solid))
     result = library.solve(
         solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
     )
     evidence = {"method": method, **result.evidence, "timings": result.seconds}
+    evidence |= _wall_of(body, wall, wall_side)
     values = (result.eigenvalues, result.frequencies, result.residuals)
     return Solution(*values, _shapes(result.modes), solid, evidence)
 
@@ -551,7 +613,7 @@ def matrices(
 ) -> tuple[csr_matrix, csr_matrix]:
     """Stiffness [N/m] and mass [kg] of a solid, (3 n, 3 n), for solvers of your own.
 
-    Row 3 i + a is the displacement of node i of the solid's `mesh.nodes` along axis a, so that an
+    Row 3 i + a is the displacement of node i along axis a, at the solid's `positions`, so that an
     eigenvector reshaped to (n, 3) is a shape. Of a free solid the six least eigenvalues [rad^2/s^2]
     are zero. Raises UserError for anything wrong with the solid. Parameters: see `solve`.
 
@@ -963,7 +1025,11 @@ def _solid(
     discretisation: str,
     fix: str | Sequence[str] = (),
     supports: Sequence[SupportEntry] = (),
+    wall: float | str | None = None,
+    wall_side: str = "about",
 ) -> Solid:
+    if wall is not None and not isinstance(body, str | Path):
+        raise UserError("wall goes with the file of a mesh; give it to load_mesh or of_triangles")
     made = given if isinstance(given, Material) else Material(1e9 if given is None else given)
     if isinstance(body, Solid):
         if made.regions or fix or supports:
@@ -973,12 +1039,21 @@ def _solid(
             )
         solid = body if given is None else body.with_young(made.moduli(body.mesh))
         return solid.with_regions(made._table()) if isinstance(given, Material) else solid
-    described = body if isinstance(body, Mesh | HexMesh) else load_mesh(body)
+    if isinstance(body, Mesh | HexMesh):
+        described = body
+    else:
+        described = load_mesh(body, wall=wall, wall_side=wall_side)
     composed = _composed(made, described, fix, supports)
     solid = _meshed(described, made, resolution, discretisation, composed)
     name = described.name if isinstance(described, Mesh) else "mesh"
     held = placed_supports(composed.supports, solid, _surface(described), name)
     return solid if held is None else solid.with_supports(held)
+
+
+def _wall_of(body: Body, wall: float | str | None, side: str) -> dict[str, Any]:
+    """Thickness and side of the wall of a solid, for its file; nothing if it has none."""
+    own = body.wall.size if isinstance(body, Mesh) and body.wall else _wall_size(wall, side)
+    return {} if own is None else {"wall": own.thickness, "wall_side": own.side}
 
 
 def _composed(
@@ -1000,14 +1075,14 @@ def _composed(
         return Placed(None, ())
     frame = SolidFrame("", _surface(body), "mesh")
     if isinstance(body, Mesh):
-        frame = SolidFrame(body.path, body.surface, body.name, body.unit)
+        frame = SolidFrame(body.path, body.skin, body.name, body.unit)
     return compose(CompositionEntry(material.regions, held), frame, fixed)
 
 
 def _surface(body: Mesh | HexMesh) -> Surface:
     """Triangles around a solid [m]."""
     if isinstance(body, Mesh):
-        return body.surface
+        return body.skin
     from trimesh import Trimesh  # Its import takes long.
 
     from carillon.fem.geometry.faces import surface_quads
@@ -1027,7 +1102,7 @@ def _meshed(
     from carillon.fem.finite_cells.build import finite_cells
     from carillon.fem.finite_cells.model import finite_cell_model
 
-    cells = finite_cells(body.surface, count, name=body.name)
+    cells = finite_cells(body.wall or body.surface, count, name=body.name)
     if composed.composition is None:
         return finite_cell_model(cells, material.moduli(cells.mesh), material._table())
     placed = material._damped(composed.composition.of_cells(cells))
@@ -1071,7 +1146,7 @@ def _start(initial: Solution, solid: Solid | None) -> Array | None:
 
     assert solid is not None
     file = _modes_of(initial)
-    require_same_mesh("initial", file.mesh.node_grid, file.mesh.cells, solid.mesh)
+    require_same_mesh("initial", file.model.node_grid, file.model.connectivity, solid)
     return file.modes
 
 

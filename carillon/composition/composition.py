@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Index
 from carillon.composition.places import ClosedSurface, Everywhere, Placement, Where
 from carillon.errors import UserError
-from carillon.fem.finite_cells.cells import FiniteCells, centroids
+from carillon.fem.finite_cells.cells import FiniteCells, middles_of_voxels
 from carillon.fem.finite_cells.regions_of_cells import regions_of_cells
 from carillon.fem.finite_cells.shared_cells import SharedCells
 from carillon.fem.geometry import HexMesh
@@ -122,7 +122,7 @@ class Composition:
         if self._is_one:
             return PlacedRegions(self.regions)
         region, shared, nowhere = regions_of_cells(cells, self.placement.at, self._surface.contains)
-        middles, _ = centroids(cells)
+        middles, _ = middles_of_voxels(cells)
         found = np.where(nowhere, -1, region.astype(np.int64))
         found = self._without_holes(found, middles, cells.mesh.edge)
         if complete:
@@ -139,7 +139,7 @@ class Composition:
         """Regions with a row for each direction of axes that vary."""
         places, number = middles, found
         if shared is not None and cells is not None:
-            voxel = cells.voxels[shared.cell, shared.octant]
+            voxel = cells.voxel[shared.portion]
             places = np.concatenate([middles, middles[voxel]])
             number = np.concatenate([found, shared.region])
         regions, number, base = self._turned_by_place(number.astype(np.int64), places)

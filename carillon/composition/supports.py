@@ -129,7 +129,7 @@ def _placed(
             by_area = np.broadcast_to(np.asarray(part.spring) * np.eye(3), (len(own), 3, 3))
         springs = areas * (along @ by_area @ along)
         return Supports(samples.points[own], springs, np.zeros(len(own)))
-    nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
+    nodes = solid.positions[np.unique(solid.connectivity)]
     nodes = nodes[part.domain.contains(nodes)]
     # Held beyond the surface and on it, a face would be kept from turning, too.
     nodes = nodes[_is_in_solid(nodes, surface, samples.size)]
@@ -205,7 +205,7 @@ def _stiff(solid: Solid, points: Array) -> Array:
     share = np.ones(len(points))
     if isinstance(solid, FiniteCellModel):
         own, _ = embedding(solid.with_supports(None), points)
-        share = np.maximum(solid.cells.fractions[own].mean(axis=1), LEAST)
+        share = np.maximum(solid.cells.fractions[own], LEAST)
     return whole * share
 
 
@@ -219,7 +219,7 @@ def _misses(part: Support, samples: _Samples, name: str, of: str = "") -> UserEr
 
 def _require_movable(parts: Sequence[Support], solid: Solid, name: str) -> None:
     """Refuse supports that hold all of the solid."""
-    nodes = solid.mesh.nodes[np.unique(solid.connectivity)]
+    nodes = solid.positions[np.unique(solid.connectivity)]
     held = np.zeros((len(nodes), 3), dtype=bool)
     for part in parts:
         springy = part.spring is not None or part.pad is not None

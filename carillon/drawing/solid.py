@@ -34,7 +34,7 @@ class Skin:
     faces: np.ndarray
     """(f, 3) triangles, wound either way."""
     weights: sp.csr_matrix | None = None
-    """(v, n) interpolation from the nodes; None if nothing moves."""
+    """(v, n) interpolation from the nodes of the solid; None if nothing moves."""
     cells: np.ndarray | None = None
     """(f,) the cell that each triangle belongs to; None if cells have no values."""
 
@@ -69,7 +69,7 @@ def draw(
     mesh
         Fine or coarse mesh.
     displacement : (n, 3) or (3 n,)
-        Displacement of the nodes, any unit.
+        Displacement of the nodes of the mesh, or of those that a skin moves with, any unit.
     values : (n,) or (m,)
         Per node or per cell, shown in colour; without them a deformed body is coloured by the
         length of its displacement and a body at rest is plain.
@@ -95,19 +95,23 @@ def draw(
     turn = _rotation(guess_up(mesh) if up == "auto" else up)
     if displacement is not None:
         displacement = np.asarray(displacement, dtype=float).reshape(-1, 3)
-        if len(displacement) != mesh.n_nodes:
-            raise ValueError(f"{len(displacement)} displacements for {mesh.n_nodes} nodes")
+        nodes = mesh.n_nodes
+        if skin is not None and skin.weights is not None:
+            nodes = skin.weights.shape[1]
+        if len(displacement) != nodes:
+            raise ValueError(f"{len(displacement)} displacements for {nodes} nodes")
+        if skin is not None:
+            displacement = skin.seen(displacement)
         if values is None:
             values = np.linalg.norm(displacement, axis=1)
     motion = _drawn_motion(mesh, displacement, scale)
     quads, cell = boundary_faces(mesh)
-    points = (mesh.nodes + motion) @ turn.T
+    points = (mesh.nodes + (motion if skin is None else 0.0)) @ turn.T
     if skin is None:
         corners = corner_values(mesh, points, quads, cell)
         light = _light(corners, quads, view)
     else:
-        moved = 0.0 if displacement is None else skin.seen(motion)
-        corners = ((skin.vertices + moved) @ turn.T)[skin.faces]
+        corners = ((skin.vertices + motion) @ turn.T)[skin.faces]
         light = _light_of_triangles(corners, view)
 
     if values is None:
@@ -207,9 +211,11 @@ def _rotation(up: str) -> np.ndarray:
     return np.array(rotations[up], dtype=float)
 
 
-def _drawn_motion(mesh: HexMesh, displacement: np.ndarray | None, scale: float | str) -> np.ndarray:
+def _drawn_motion(
+    mesh: HexMesh, displacement: np.ndarray | None, scale: float | str
+) -> np.ndarray | float:
     if displacement is None:
-        return np.zeros((mesh.n_nodes, 3))
+        return 0.0
     if scale != "auto":
         return float(scale) * displacement
     largest = np.linalg.norm(displacement, axis=1).max()
@@ -225,12 +231,12 @@ def _face_values(
     skin: Skin | None,
 ) -> np.ndarray:
     values = np.asarray(values, dtype=float)
-    if values.shape == (mesh.n_nodes,):
-        return np.asarray((values if skin is None else skin.seen(values))[faces].mean(axis=1))
+    if values.shape == (mesh.n_nodes if skin is None else len(skin.vertices),):
+        return np.asarray(values[faces].mean(axis=1))
     if values.shape == (mesh.n_cells,) and cells is not None:
         return np.asarray(values[cells])
     raise ValueError(
-        f"values have shape {values.shape}, expected ({mesh.n_nodes},) per node or "
+        f"values have shape {values.shape}, expected ({mesh.n_nodes},) per node, or vertex, or "
         f"({mesh.n_cells},) per cell"
     )
 

@@ -49,13 +49,11 @@ class Elements(ABC):
 
     @property
     @abstractmethod
-    def steps(self) -> int:
-        """Edges along an element: planes of the lattice that far apart separate elements."""
+    def steps(self) -> int | None:
+        """Edges along an element: planes of the lattice that far apart separate elements.
 
-    @property
-    @abstractmethod
-    def collinear(self) -> Flags | None:
-        """Which elements (c,) may have three nodes on a line; None if none has."""
+        None of elements of several sizes, which some of any planes pass through.
+        """
 
     @property
     @abstractmethod
@@ -102,7 +100,10 @@ class Elements(ABC):
 
     @abstractmethod
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        """Weights (p, k) of the nodes of `elements` (p,) at places (p, 3) in them, from 0 to 1."""
+        """Weights (p, k) of the nodes of `elements` (p,) at places (p, 3) in them, from 0 to 1.
+
+        Beside them those of the nearest place, or what goes on from there.
+        """
 
     def with_young(self, young: Array) -> Self:
         """The same elements with other moduli."""
@@ -139,8 +140,8 @@ class HexElements(Elements):
     attached: Attached | None = None
 
     @property
-    def steps(self) -> int:
-        return 1 if self.kinds is None else 2
+    def steps(self) -> int | None:
+        return 1 if self.kinds is None else None
 
     @property
     def node_places(self) -> Index:
@@ -149,16 +150,12 @@ class HexElements(Elements):
         return node_places()[self.kinds]
 
     @property
-    def collinear(self) -> Flags | None:
-        return None if self.kinds is None else (self.kinds != WHOLE) & (self.kinds % 256 != 0)
-
-    @property
     def sort_key(self) -> NDArray[np.uint8]:
         return self.fill
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
         """Trilinear weights (p, 8); what a hanging corner says is the nodes' that it hangs from."""
-        weights = shape_functions(places)
+        weights = shape_functions(np.clip(places, 0.0, 1.0))
         if self.kinds is None:
             return weights
         return np.einsum("pk,pkj->pj", weights, node_weights()[self.kinds[elements]])

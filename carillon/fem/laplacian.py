@@ -7,13 +7,14 @@ reduce the material (Y = Phi z, section 6 of the paper) and cut the mesh (sectio
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Index
 from carillon.fem.aggregation import COARSEST, Level, levels_of
 from carillon.fem.geometry.faces import face_neighbours
 from carillon.fem.multigrid import ShiftedInverse
@@ -31,9 +32,24 @@ TOLERANCE = 1e-6
 """Relative error of eigenvalues from an iterative inverse."""
 
 
-def cell_laplacian(mesh: HexMesh) -> sp.csr_matrix:
+@dataclass(frozen=True, eq=False)
+class CellGraph:
+    """Cells of any sizes, and which of them share a face."""
+
+    grid: Index
+    """(m, 3) where they are, in integers."""
+    pairs: Index
+    """(p, 2)."""
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return len(self.grid)
+
+
+def cell_laplacian(mesh: HexMesh | CellGraph) -> sp.csr_matrix:
     """Graph Laplacian (m, m) of the face neighbours: degree on the diagonal, -1 per shared face."""
-    pairs = face_neighbours(mesh)
+    pairs = mesh.pairs if isinstance(mesh, CellGraph) else face_neighbours(mesh)
     ones = np.ones(len(pairs))
     adjacency = sp.coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_cells,) * 2)
     adjacency = (adjacency + adjacency.T).tocsr()
@@ -41,7 +57,7 @@ def cell_laplacian(mesh: HexMesh) -> sp.csr_matrix:
     return (sp.diags(degree) - adjacency).tocsr()
 
 
-def laplacian_modes(mesh: HexMesh, count: int) -> tuple[Array, Array]:
+def laplacian_modes(mesh: HexMesh | CellGraph, count: int) -> tuple[Array, Array]:
     """The `count` lowest eigenpairs of the cell Laplacian: values (count,), vectors (m, count).
 
     The first is the constant.  Vectors have unit length and a sign that makes their largest entry

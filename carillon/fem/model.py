@@ -8,11 +8,13 @@ from typing import Any, Self, TypedDict, Unpack, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Flags
+from carillon.arrays import Array, Flags, Index
 from carillon.fem.block import ALL_FILLED
+from carillon.fem.element import CORNERS
 from carillon.fem.elements import Chosen, Elements, HexElements
 from carillon.fem.embedding import embedding
 from carillon.fem.geometry import HexMesh
+from carillon.fem.laplacian import CellGraph
 from carillon.fem.moduli import at_points, require_moduli
 from carillon.fem.regions import DEFAULT_DENSITY as DEFAULT_DENSITY
 from carillon.fem.regions import Damping as Damping
@@ -58,15 +60,30 @@ class Solid(ABC):
         """Motions without strain that its supports leave it."""
         if self.supports is None:
             return RIGID_MODES
-        nodes = self.mesh.nodes
+        nodes = self.positions
         centre = nodes.mean(axis=0)
         extent = float(np.abs(nodes - centre).max())
         return self.supports.free_motions(centre, extent).shape[1]
 
     @property
+    def positions(self) -> Array:
+        """Positions (n, 3) [m] of the nodes, whose displacements are unknown."""
+        return self.mesh.nodes
+
+    @property
+    def node_grid(self) -> NDArray[np.int32]:
+        """Integer coordinates (n, 3) of the nodes."""
+        return self.mesh.node_grid
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.node_grid)
+
+    @property
     def n_dofs(self) -> int:
         """Number of displacement unknowns."""
-        return 3 * self.mesh.n_nodes
+        return 3 * self.n_nodes
 
     @property
     @abstractmethod
@@ -80,13 +97,18 @@ class Solid(ABC):
 
     @property
     @abstractmethod
-    def hexmesh(self) -> HexMesh:
-        """The elements as cubes with nodes at their corners, by which neighbours are found."""
+    def graph(self) -> HexMesh | CellGraph:
+        """The elements, and which of them share a face."""
 
     @property
     @abstractmethod
-    def filled(self) -> Flags:
-        """Which octants (c, 8) of the elements hold material."""
+    def boxes(self) -> tuple[Array, Array]:
+        """Lowest corners (c, 3) and edges (c,) [m] of the elements."""
+
+    @abstractmethod
+    def far_from_material(self, elements: Index, points: Array) -> Array:
+        """Distance (p, c) [m] of `points` (p, 3) [m] from the nearest voxel, or octant of one, that
+        holds material of `elements` (p, c)."""
 
     @abstractmethod
     def element_moduli(self, young: Array) -> Array:
@@ -174,11 +196,25 @@ class ElasticModel(Solid):
         return np.asarray(self.mesh.cells)
 
     @property
-    def hexmesh(self) -> HexMesh:
+    def graph(self) -> HexMesh:
         return self.mesh
 
     @property
+    def boxes(self) -> tuple[Array, Array]:
+        mesh = self.mesh
+        span = np.ones(mesh.n_cells) if mesh.span is None else mesh.span.astype(float)
+        return mesh.origin + mesh.edge * mesh.grid, mesh.edge * span
+
+    def far_from_material(self, elements: Index, points: Array) -> Array:
+        low, edges = self.boxes
+        middles = edges[elements][:, :, None, None] * (CORNERS + 0.5) / 2.0
+        centres = low[elements][:, :, None] + middles
+        distance = np.linalg.norm(centres - points[:, None, None], axis=3)
+        return np.asarray(np.where(self.filled[elements], distance, np.inf).min(axis=2))
+
+    @property
     def filled(self) -> Flags:
+        """Which octants (c, 8) of the elements hold material."""
         return np.unpackbits(self.fill[:, None], axis=1, bitorder="little").astype(bool)
 
     def element_moduli(self, young: Array) -> Array:
@@ -272,7 +308,7 @@ class MassProperties:
 
 def mass_properties(model: Solid) -> MassProperties:
     """Integrals of the density over the solid; exact, as elements have all linear functions."""
-    corners = model.mesh.nodes[model.connectivity]
+    corners = model.positions[model.connectivity]
     nodal = model.nodal_mass()
     mass = float(nodal.sum())
     centre = np.einsum("cab,cbi->i", nodal, corners) / mass

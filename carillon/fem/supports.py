@@ -88,8 +88,9 @@ class Attached:
         """Add to the stiffness (c, 3 k, 3 k) [N/m] of elements with these numbers (c,)."""
         for element, points in self._of(number):
             weights, springs = self.weights[points], self.supports.stiffness[points]
-            added = np.einsum("pa,pij,pb->aibj", weights, springs, weights, optimize=True)
-            matrices[element] += added.reshape(matrices.shape[1:])
+            for i, j in np.ndindex(3, 3):
+                added = (weights * springs[:, i, j, None]).T @ weights
+                matrices[element, i::3, j::3] += added
 
     def add_mass(self, number: NDArray[np.int32], matrices: Array) -> None:
         """Add to the nodal mass (c, k, k) [kg] of elements with these numbers (c,)."""

@@ -1,4 +1,4 @@
-"""Finite cells of which those with the largest errors are divided."""
+"""Finite cells of which those with the largest errors are divided, again and again."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,9 +12,9 @@ from carillon.command_line.progress import say
 from carillon.composition.composition import PlacedRegions
 from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.covering import Covering
+from carillon.fem.finite_cells.covering import MOST_LEVELS, Covering, balanced
 from carillon.fem.finite_cells.model import FiniteCellModel
-from solver.accuracy.estimate import CellErrors, estimate_cell_errors
+from solver.accuracy.estimate import HALVED, CellErrors, estimate_cell_errors
 from solver.analysis.modes import Modes
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
 from solver.refinement.errors import DIVIDED_CELLS, RefinementStep
@@ -22,9 +22,15 @@ from solver.refinement.estimate import MODES_USED
 
 REMAINING = 0.7
 """Share of the allowed error at which the division of cells aims."""
-MOST_DIVIDED = 0.15
-"""Largest share of the cells that is divided. Beyond it a finer lattice is worth more."""
-MOST_STEPS = 3
+LEAST, MOST = 0.5, 0.9
+"""Bounds of the share of the error whose cells one round divides: fewer gain little for another
+solution, of more a later round knows more."""
+LARGEST, MOST_GROWTH = 60_000, 2.0
+"""Unknowns beyond which no cells are divided, or, of models with many, how many times as many as
+without; a finer lattice is worth more then."""
+OF_DIVISION = 150
+"""About the number of unknowns that a cell adds where it is divided."""
+MOST_STEPS = 5
 """Largest number of rounds in which cells are divided."""
 
 
@@ -40,8 +46,13 @@ class DividedCells:
         self.model, self._undivided, self._covering = model, model, covering
         alike = PlacedRegions(model.regions)
         self._placed_on = placed_on or (lambda cells: alike)
-        self._places: Index = np.empty((0, 3), dtype=np.int64)
+        self._divisions: list[Index] = [np.empty((0, 3), dtype=np.int64)] * MOST_LEVELS
         self._steps = 0
+
+    @property
+    def count(self) -> int:
+        """Number of cells that are divided."""
+        return sum(len(places) for places in self._divisions)
 
     def advance(self, values: Array, modes: Array, tolerance: float) -> tuple[RefinementStep, bool]:
         """Rate the cells by eigenvalues (k,) and modes (n_dofs, k), and divide some of them.
@@ -50,7 +61,7 @@ class DividedCells:
         many of them would have to be divided.
         """
         estimate = estimate_cell_errors(self.model, values, modes)
-        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, len(self._places), estimate.errors)
+        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, self.count, estimate.errors)
         above = estimate.errors.excess(tolerance)
         if above <= 1.0 or self._steps == MOST_STEPS:
             return step, True
@@ -58,41 +69,40 @@ class DividedCells:
         return step, not (len(chosen) and self._divide(chosen))
 
     def _chosen(self, estimate: CellErrors, left: float) -> Index:
-        """Places (d, 3) of cells to divide so that of the error a share is `left`, or of the worst.
-
-        Those that were divided cannot be divided again.
-        """
+        """Cells (d,) to divide so that of the error a share is `left`, or of the worst."""
         cells = self.model.cells
-        whole = cells.span == cells.span.max()
-        gains = np.where(whole, estimate.shares * (1.0 - 1.0 / estimate.factors), 0.0)
+        gains = np.where(cells.levels == MOST_LEVELS, 0.0, estimate.shares)
         order = np.argsort(-gains, kind="stable")
-        total = estimate.shares.sum()
-        count = 1 + int(np.searchsorted(np.cumsum(gains[order]), (1.0 - left) * total))
-        most = MOST_DIVIDED * len(self._undivided.cells) - len(self._places)
-        order = order[: min(count, int(most))]
-        step = self._undivided.mesh.edge / cells.mesh.edge
-        return np.unique((cells.grid[order[gains[order] > 0.0]] // step).astype(np.int64), axis=0)
+        part = np.clip((1.0 - left) / (1.0 - 1.0 / HALVED), LEAST, MOST)
+        count = 1 + int(np.searchsorted(np.cumsum(gains[order]), part * estimate.shares.sum()))
+        room = max(LARGEST, MOST_GROWTH * self._undivided.n_dofs) - self.model.n_dofs
+        order = order[: min(count, max(int(room / OF_DIVISION), 0))]
+        return np.asarray(order[gains[order] > 0.0])
 
-    def _divide(self, places: Index) -> bool:
-        """Divide the cells at more places (d, 3), and whether that was possible."""
-        together = np.unique(np.concatenate([self._places, places]), axis=0)
+    def _divide(self, chosen: Index) -> bool:
+        """Divide more cells (d,), and whether that was possible."""
+        cells, divisions = self.model.cells, list(self._divisions)
+        levels, places = cells.levels[chosen], cells.corner[chosen] // cells.span[chosen, None]
+        for level in range(MOST_LEVELS):
+            both = np.concatenate([divisions[level], places[levels == level]])
+            divisions[level] = np.unique(both.astype(np.int64), axis=0)
+        divisions = balanced(divisions, self._covering.shape)
         try:
-            division = self._covering.divided(together)
+            divided = self._covering.divided(divisions)
         except UserError as error:
             say(f"no more cells are divided: {error}")
             return False
-        self._places = together
-        factor = self._undivided.young
-        whole = self._undivided
-        if whole.region is not None:
-            factor = factor / whole.regions.young[whole.region]
-        placed = self._placed_on(division.cells)
-        young = factor[division.voxel]
+        self._divisions = divisions
+        placed = self._placed_on(divided)
+        whole, young = self._undivided, self._undivided.young
         if placed.region is not None:
-            young = placed.regions.moduli(placed.region, young)
+            factor = young
+            if whole.region is not None:
+                factor = young / whole.regions.young[whole.region]
+            young = placed.regions.moduli(placed.region, factor)
         self.model = replace(
             whole,
-            cells=division.cells,
+            cells=divided,
             young=young,
             regions=placed.regions,
             region=placed.region,

@@ -1,27 +1,31 @@
 """How far the frequencies of finite cells are from those of the solid.
 
-Let an error e fall by the factor r when cells are halved: 16 where displacements are smooth, less
-at edges that point inwards and other singular places. If cells were twice and four times as large,
-modes would lose L2 = e (r - 1) and L4 = e (r^2 - 1), which `solver.accuracy.surplus` finds. So,
-place by place, r = L4 / L2 - 1 and e = L2 / (r - 1): Richardson's extrapolation without a second
-solve. What none of these cells can do is added, see `solver.accuracy.cubics`.
+More functions can only lower an eigenvalue. Cells get some of higher degree, see
+`solver.accuracy.enriched`, and what one step towards the solution with them gains of a mode, see
+`solver.accuracy.stars`, is a lower bound of its error. What further steps and functions would gain
+is about as much again, on solids whose frequencies are known; see docs/explanation/finite-cells.md.
 """
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.errors import UserError
+from carillon.fem.finite_cells.basis import DEGREE
 from carillon.fem.finite_cells.model import FiniteCellModel
-from solver.accuracy.cubics import CubicSurplus, cubic_surplus
-from solver.accuracy.surplus import losses
+from solver.accuracy.enriched import enriched
+from solver.accuracy.stars import gained
 from solver.refinement.errors import LAST, ExpectedErrors
 
-SLOWEST, FASTEST = 2.0, 16.0
-"""Bounds of the factor by which halved cells diminish an error: that of cracks, and of smooth
-displacements."""
-MOST_LOST = 0.9
-"""Largest share of an eigenvalue that functions left out may take from it."""
+BEYOND = 2.4
+"""What an eigenvalue is expected to fall by, over what one step gains: the median of solids whose
+frequencies are known."""
+HALVED = 8.0
+"""Factor by which dividing a cell and those about it diminishes its share of the error. No measure
+of how smooth modes are in a cell foretells it better."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +36,14 @@ class CellErrors:
     """Of the frequencies; positive, since they are too high."""
     shares: Array
     """(c,) each cell's share in them, root mean square over the modes."""
-    factors: Array
-    """(c,) by which dividing the cell would diminish its share."""
 
 
 def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) -> CellErrors:
     """Expected errors of the frequencies of finite cells against the solid's, up to mode `LAST`.
 
-    `values` (k,) are eigenvalues [rad^2/s^2] and `modes` (n_dofs, k) mass-normalised, the six rigid
-    ones included.
+    `values` (k,) are eigenvalues [rad^2/s^2] and `modes` (n_dofs, k) mass-normalised, the rigid
+    ones included. Raises UserError for cells of another degree than four, and those
+    of files, which lack the moments.
 
     Examples
     --------
@@ -54,26 +57,13 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     >>> 0.0 < estimate_cell_errors(model, found.eigenvalues, found.modes).errors.rms < 0.2
     True
     """
+    if model.cells.degree != DEGREE or model.cells.line_weights is None:
+        raise UserError("errors of cells from files are not estimated; expected those of a surface")
     elastic = slice(model.rigid_modes, min(LAST, len(values)))
-    chosen = np.ascontiguousarray(modes[:, elastic])
-    twice, fourfold, group = losses(model, chosen)
     own = values[elastic]
-    lost = np.stack([np.bincount(group, (each / own).sum(axis=1)) for each in (twice, fourfold)])
-    ratio = lost[1] / np.maximum(lost[0], np.finfo(float).tiny)
-    factors = np.clip(ratio - 1.0, SLOWEST, FASTEST)[group]
-    # A frequency's relative error is half its eigenvalue's.
-    shares = 0.5 * twice / own / (factors - 1.0)[:, None]
-    shares += _unseen(cubic_surplus(model, own, chosen), own, shares.sum(axis=0))
-    errors = ExpectedErrors(shares.sum(axis=0), model.rigid_modes)
-    return CellErrors(errors, np.sqrt(np.mean(shares**2, axis=1)), factors)
-
-
-def _unseen(surplus: CubicSurplus, own: Array, errors: Array) -> Array:
-    """Relative errors (c, k) in each cell by which extrapolated ones (k,) are below the surplus's.
-
-    Extrapolation sees nothing of what cells of no size can do.
-    """
-    lost = np.minimum(surplus.gains / own, MOST_LOST)
-    missing = np.maximum(1.0 / np.sqrt(1.0 - lost) - 1.0 - errors, 0.0)
-    total = np.maximum(surplus.shares.sum(axis=0), np.finfo(float).tiny)
-    return np.asarray(missing * surplus.shares / total)
+    space = enriched(model)
+    gain, within = gained(space, space.residual(own, np.ascontiguousarray(modes[:, elastic])))
+    relative = np.sqrt(1.0 + BEYOND * gain / own) - 1.0
+    shares = relative * within
+    errors = ExpectedErrors(relative, model.rigid_modes)
+    return CellErrors(errors, np.sqrt(np.mean(shares**2, axis=1)))

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from carillon.arrays import Array, Surface
-from carillon.fem.finite_cells.build import covering
+from carillon.fem.finite_cells.build import covering, whole_cells
 from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry.grid import Grid, bounding_grid
@@ -77,8 +77,7 @@ def voxel_lattice(surface: Surface, resolution: int) -> Grid:
     They follow at the far ends, so that the voxels of the surface are on it.
     """
     grid = bounding_grid(surface, resolution)
-    nx, ny, nz = (-(-size // WHOLE) * WHOLE for size in grid.shape)
-    return Grid(grid.origin, grid.edge, (nx, ny, nz))
+    return whole_cells(grid, WHOLE)
 
 
 def covering_on(surface: Surface, lattice: Grid, components: str, name: str) -> Covering:

@@ -97,6 +97,21 @@ class SolverOptions:
         """Whether an eigensolver of SLEPc's finds the modes, as ground truth."""
         return self.method in TYPES
 
+    def for_residuals(self) -> SolverOptions:
+        """The options with a tolerance that lets the modes' residuals tell errors of elements.
+
+        Raises UserError where modes are not corrected.
+        """
+        if self.is_general:
+            return self
+        if not self.is_corrected:
+            raise UserError(
+                "modes that are not corrected do not tell how far finite cells are from the solid; "
+                "add --no-estimate, or leave out --tolerance 0 and --corrections 0"
+            )
+        tolerance = EIGENVALUE_TOLERANCE if self.tolerance is None else self.tolerance
+        return replace(self, tolerance=min(tolerance, EIGENVALUE_TOLERANCE))
+
     @property
     def keeps_missed(self) -> bool:
         """Whether a correction that misses its tolerance yields what it has reached."""

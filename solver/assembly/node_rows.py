@@ -14,6 +14,7 @@ from carillon.arrays import Array, Index
 from carillon.fem.elements import Elements
 from solver.assembly.halo import Halo
 from solver.assembly.row_products import RowProducts
+from solver.distribution.node_graph import graph_of_cells
 
 ENTRIES_AT_ONCE = 4096 * 576
 """Number of entries of element matrices that exist at once while K is assembled."""
@@ -46,7 +47,7 @@ class Pattern:
         n_own = stop - start
         local = np.where(own, corners - start, n_own + np.searchsorted(ghosts_there, corners))
         width = n_own + len(ghosts_there)
-        indptr, columns, entry = _graph(local, n_own, width)
+        indptr, columns, entry = graph_of_cells(local, n_own, width)
         return cls(indptr, columns, entry, ghosts_there, start, stop)
 
     @cached_property
@@ -185,55 +186,6 @@ class NodeRows:
 def _sorted(matrix: sp.csr_matrix) -> sp.csr_matrix:
     matrix.sort_indices()
     return matrix
-
-
-@numba.njit(cache=True, nogil=True)
-def _graph(cells, rows, width):  # type: ignore[no-untyped-def]
-    """Compressed rows of which numbers below `width` share a cell, and the entries of the pairs."""
-    count, nodes = cells.shape
-    first = np.zeros(rows + 1, dtype=np.int64)
-    for cell in range(count):
-        for a in range(nodes):
-            if cells[cell, a] < rows:
-                first[cells[cell, a] + 1] += 1
-    first = np.cumsum(first)
-    place = np.empty(first[-1], dtype=np.int64)
-    filled = first[:-1].copy()
-    for cell in range(count):
-        for a in range(nodes):
-            row = cells[cell, a]
-            if row < rows:
-                place[filled[row]] = cell * nodes + a
-                filled[row] += 1
-    indptr = np.zeros(rows + 1, dtype=np.int64)
-    seen = np.full(width, -1, dtype=np.int64)
-    for row in range(rows):
-        indptr[row + 1] = indptr[row]
-        for number in range(first[row], first[row + 1]):
-            for column in cells[place[number] // nodes]:
-                if column < width and seen[column] != row:
-                    seen[column] = row
-                    indptr[row + 1] += 1
-    columns, at = np.empty(indptr[-1], dtype=np.int64), np.empty(width, dtype=np.int64)
-    entry = np.full((count, nodes, nodes), -1, dtype=np.int32)
-    seen[:] = -1
-    for row in range(rows):
-        end = indptr[row]
-        for number in range(first[row], first[row + 1]):
-            for column in cells[place[number] // nodes]:
-                if column < width and seen[column] != row:
-                    seen[column] = row
-                    columns[end] = column
-                    end += 1
-        columns[indptr[row] : end].sort()
-        for number in range(indptr[row], end):
-            at[columns[number]] = number
-        for number in range(first[row], first[row + 1]):
-            cell, a = divmod(place[number], nodes)
-            for b in range(nodes):
-                if cells[cell, b] < width:
-                    entry[cell, a, b] = at[cells[cell, b]]
-    return indptr, columns, entry
 
 
 @numba.njit(cache=True, nogil=True)

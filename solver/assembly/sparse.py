@@ -61,5 +61,5 @@ def assemble_elements(
 def assembled(model: Solid) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Stiffness and mass of the whole model on one rank."""
     return assemble_elements(
-        model.connectivity, model.stiffness(), model.nodal_mass(), model.mesh.n_nodes
+        model.connectivity, model.stiffness(), model.nodal_mass(), model.n_nodes
     )

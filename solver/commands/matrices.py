@@ -65,8 +65,8 @@ def run(arguments: argparse.Namespace) -> None:
             )
     if arguments.nodes is not None:
         with atomic_path(arguments.nodes) as temporary, open(temporary, "wb") as stream:
-            np.save(stream, model.mesh.nodes)
-        print(f"{arguments.nodes}: positions of {model.mesh.n_nodes:,} nodes [m]")
+            np.save(stream, model.positions)
+        print(f"{arguments.nodes}: positions of {model.n_nodes:,} nodes [m]")
 
 
 def _require_outputs(arguments: argparse.Namespace) -> None:

@@ -126,13 +126,20 @@ def _options(
     resolution = _resolution(arguments.resolution, distance.accuracy)
     given = argparse.Namespace(**{**vars(arguments), "resolution": resolution})
     solid, solver = collect(ProblemOptions, given), collect(SolverOptions, given)
+    is_told = distance.estimate is not False and (solver.is_general or solver.is_corrected)
     refine_to = collect(RefinementOptions, given).tolerance(
-        solid.coarsen, solid.discretisation, distance.estimate is not False
+        solid.coarsen, solid.discretisation, is_told
     )
     initial = arguments.initial_modes
     if arguments.refine:
         _require_no_other_start(solid, initial)
     estimated = distance.is_estimated(solid, solver)
+    if estimated and solid.discretisation == "finite-cell":
+        is_asked = distance.accuracy is not None or distance.estimate or refine_to is not None
+        if not is_asked and not solver.is_general and not solver.is_corrected:
+            estimated = False
+        else:
+            solver = solver.for_residuals()
     return solid, solver, AccuracyRequest(distance.accuracy, refine_to, estimated, initial)
 
 

@@ -54,6 +54,8 @@ def attributes_of(
         **solved.achieved,
         "timings": seconds,
     }
+    if solid.wall is not None:
+        attributes |= {"wall": solid.wall, "wall_side": solid.wall_side}
     if solver.tolerance is not None:
         attributes["tolerance"] = solver.tolerance
     return attributes

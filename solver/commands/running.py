@@ -43,6 +43,10 @@ def on_ranks(petsc: str | None = None) -> Iterator[MPI.Comm]:
         raise petsc_options.meaning(error, petsc) from error
 
 
+WALL = ("wall", "wall_side")
+"""Those of solids that are walls, for commands on what a mesh encloses."""
+
+
 def add_solid(parser: argparse.ArgumentParser, *leave_out: str) -> None:
     """Add the arguments that describe a solid, some of them left out."""
     add_options(parser, ProblemOptions, leave_out, positional=("mesh",))
@@ -50,7 +54,7 @@ def add_solid(parser: argparse.ArgumentParser, *leave_out: str) -> None:
 
 def add_voxels(parser: argparse.ArgumentParser, *leave_out: str) -> None:
     """Likewise of a command on blocks of voxels, which chooses the coarsening by itself."""
-    add_solid(parser, "coarsen", "discretisation", *leave_out)
+    add_solid(parser, "coarsen", "discretisation", *WALL, *leave_out)
 
 
 def require_outputs(arguments: argparse.Namespace, comm: MPI.Comm = MPI.COMM_SELF) -> None:

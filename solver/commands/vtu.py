@@ -10,10 +10,10 @@ import argparse
 from pathlib import Path
 
 from carillon.errors import UserError
-from carillon.fem.geometry import load_surface
 from carillon.files.paths import require_writable
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.quantities import MetresPerUnit
+from solver.analysis.solid_surface import SolidSurface
 from solver.exchange.displayed import displayed_surface
 from solver.exchange.modes_vtu import (
     PVD,
@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="MODES", help="modes file")
     parser.add_argument("--out", required=True, help="file to write: .vtu, or .pvd with --mode")
     parser.add_argument(
-        "--surface", metavar="MESH", help="mesh of the solid, or builtin:NAME, to show its surface"
+        "--surface",
+        metavar="MESH",
+        help="mesh of the solid, or builtin:NAME, to show its surface; of a wall, both sides",
     )
     parser.add_argument(
         "--unit",
@@ -63,8 +65,8 @@ def run(arguments: argparse.Namespace) -> None:
     spectrum = StreamedModes.of_file(arguments.file)
     shown = None
     if arguments.surface:
-        surface = load_surface(arguments.surface, arguments.unit)
-        shown = displayed_surface(spectrum.model, surface, arguments.surface)
+        surface = SolidSurface.read(arguments.surface, arguments.unit, spectrum.wall)
+        shown = displayed_surface(spectrum.model, surface.triangles, arguments.surface)
     hertz = spectrum.frequencies
     if motion.mode is None:
         write_all_modes(arguments.out, spectrum, shown)

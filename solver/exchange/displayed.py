@@ -1,4 +1,4 @@
-"""What shows a solid: cubes of its elements or of the octants of its finite cells, or its surface.
+"""What shows a solid: cubes of its elements or of the voxels of its finite cells, or its surface.
 
 Corners that hang between larger elements are points of their own, so that every cube has eight, at
 its own corners, and is seen where the model has it.
@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index, Surface
 from carillon.errors import UserError
-from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry.hanging import node_weights
-from carillon.fem.model import Solid
+from carillon.fem.model import ElasticModel, Solid
 from carillon.files.vtu import HEXAHEDRON, HEXAHEDRON_CORNERS, TRIANGLE
 from solver.response.points import interpolation
 
@@ -50,19 +49,21 @@ class Displayed:
 def displayed(model: Solid) -> Displayed:
     """The cubes of a solid; points come in the order of the nodes, those that hang after them.
 
-    Elements are one cube each, void octants of coarse ones with them. Of finite cells the octants
-    that hold material are shown: all nodes are at their corners. A divided cell, which lies in one
-    voxel, is one cube, whose corners never hang.
+    Elements are one cube each, void octants of coarse ones with them. Of finite cells the voxels
+    that hold material are shown, whose corners move with the cells.
     """
     mesh = model.mesh
     cells, matrix = mesh.cells, None
+    is_finite = isinstance(model, FiniteCellModel)
     if isinstance(model, FiniteCellModel):
-        share = _shares(model.cells)
+        share = model.cells.voxel_shares()
+        matrix = interpolation(model, mesh.nodes)
     else:
+        assert isinstance(model, ElasticModel)
         share = model.filled.mean(axis=1)
         if mesh.kinds is not None and mesh.hanging is not None:
             cells, matrix = _with_hanging(mesh.cells, mesh.hanging, node_weights()[mesh.kinds])
-    points = mesh.nodes if matrix is None else matrix @ mesh.nodes
+    points = mesh.nodes if is_finite or matrix is None else matrix @ mesh.nodes
     young = model.young.reshape(mesh.n_cells, -1).mean(axis=1)
     data = {YOUNG: young, DENSITY: _density(model, share)}
     if model.region is not None:
@@ -75,6 +76,7 @@ def _region(model: Solid) -> NDArray[np.integer]:
     assert model.region is not None
     if model.region.ndim == 1:
         return model.region
+    assert isinstance(model, ElasticModel)
     filled = model.filled
     votes = ((model.region[:, :, None] == model.region[:, None]) & filled[:, None]).sum(axis=2)
     most = np.where(filled, votes, -1).argmax(axis=1)
@@ -88,6 +90,7 @@ def _density(model: Solid, share: Array) -> Array:
         return float(density[0]) * share
     if model.region.ndim == 1:
         return np.asarray(density[model.region] * share)
+    assert isinstance(model, ElasticModel)
     return np.asarray((density[model.region] * model.filled).mean(axis=1))
 
 
@@ -100,7 +103,6 @@ def displayed_surface(model: Solid, surface: Surface, name: str) -> Displayed:
 
     edge, box = model.mesh.edge, np.asarray(surface.bounds)
     apart = np.abs(box - model.mesh.bounds).max()
-    # Finite cells reach beyond the surface by less than their edge, which is that of two voxels.
     if apart > 2.0 * edge:
         raise UserError(
             f"{name}: its box is up to {apart:.4g} m off that of the modes, expected the surface "
@@ -115,17 +117,6 @@ def displayed_surface(model: Solid, surface: Surface, name: str) -> Displayed:
     points, faces = subdivide_to_size(surface.vertices, surface.faces, edge, max_iter=64)
     points = np.asarray(points)
     return Displayed(points, np.asarray(faces), TRIANGLE, interpolation(model, points))
-
-
-def _shares(cells: FiniteCells) -> Array:
-    """Share (m,) of each voxel's volume that is inside; one may be a whole divided cell."""
-    owner, octant = np.nonzero(cells.voxels >= 0)
-    voxel = cells.voxels[owner, octant]
-    inside = np.bincount(voxel, cells.fractions[owner, octant])
-    parts = np.ones(len(inside))
-    if cells.is_mixed:
-        parts[voxel[cells.span[owner] == 2]] = 8.0
-    return inside / parts
 
 
 def _with_hanging(

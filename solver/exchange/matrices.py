@@ -28,7 +28,7 @@ def matrices(model: Solid) -> tuple[sp.csr_matrix, sp.csr_matrix]:
 
     Entries are those that all commands solve with; element matrices exist a few at a time.
     """
-    count = model.mesh.n_nodes
+    count = model.n_nodes
     rows = NodeRows(Pattern.of_cells(model.connectivity.astype(np.int64), 0, count))
     rows.add_elements(model.elements)
     return rows.stiffness_csr(model.n_dofs), rows.mass_csr(model.n_dofs)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.errors import UserError
+from carillon.fem.geometry.walls import WallSize
 from carillon.fem.model import Solid
 from carillon.files.atomic import atomic_path
 from carillon.files.datasets import find, finite
@@ -50,6 +51,8 @@ class StreamedModes:
     """(k,) [Hz] and residual ratios."""
     shapes: Callable[[int, int], Iterator[Array]]
     """Displacements (n, 3) of the modes from one to before another, counted from 0."""
+    wall: WallSize | None = None
+    """The wall that the solid is, see `solver.files.modes_file.ModesFile`."""
 
     @classmethod
     def of_file(cls, path: str | Path) -> "StreamedModes":
@@ -65,7 +68,7 @@ class StreamedModes:
                     for column in block.T:
                         yield column.reshape(-1, 3)
 
-        return cls(file.model, file.frequencies, file.residuals, shapes)
+        return cls(file.model, file.frequencies, file.residuals, shapes, file.wall)
 
     @classmethod
     def of_contents(cls, file: ModesFile) -> "StreamedModes":
@@ -76,7 +79,7 @@ class StreamedModes:
         def shapes(first: int, stop: int) -> Iterator[Array]:
             return (column.reshape(-1, 3) for column in modes[:, first:stop].T)
 
-        return cls(file.model, file.frequencies, file.residuals, shapes)
+        return cls(file.model, file.frequencies, file.residuals, shapes, file.wall)
 
     def grid(self, shown: Displayed, points: Array | None = None) -> UnstructuredGrid:
         """The cells with their data, at other `points` (p, 3) [m] than theirs if given."""

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Integers
 from carillon.errors import UserError
 from carillon.fem.block import degrees_of_freedom
-from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
 from carillon.files.datasets import INTEGER, find, finite, read
 from carillon.files.hdf5 import open_h5
 from solver.distribution.collective import bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh
+from solver.files.cells_group import FINITE_CELLS
 from solver.files.modes_file import KIND, SCHEMA
 
 COLUMNS = 16
@@ -41,12 +41,13 @@ def modes_from_file(
         assert model is not None
         with open_h5(path, KIND, SCHEMA, sealed=True) as file:
             grid = read(file, "node_grid", (None, 3), INTEGER)
-            cells = read(file, "cells", (None, 8), INTEGER)
+            own = f"{FINITE_CELLS}/nodes" if FINITE_CELLS in file else "cells"
+            cells = read(file, own, (None, None), INTEGER)
             modes_there = find(file, "modes", (3 * len(grid), None))
             count = int(modes_there.shape[1])
             for first in range(0, count, COLUMNS):
                 finite(file, "modes", modes_there[:, first : first + COLUMNS])
-        require_same_mesh(str(path), grid, cells, model.mesh)
+        require_same_mesh(str(path), grid, cells, model)
         if count < modes:
             raise UserError(
                 f"{path}: holds {count} modes, {modes} are wanted; start from a file with as many"
@@ -57,12 +58,13 @@ def modes_from_file(
     return scatter_rows(_read_columns(path, count), count, local_mesh, comm)
 
 
-def require_same_mesh(name: str, grid: Index, cells: Index, mesh: HexMesh) -> None:
-    """Raise UserError unless the nodes (n, 3) and cells (m, 8) of modes are those of a mesh."""
-    if not (np.array_equal(grid, mesh.node_grid) and np.array_equal(cells, mesh.cells)):
+def require_same_mesh(name: str, grid: Integers, cells: Integers, solid: Solid) -> None:
+    """Raise UserError unless nodes (n, 3) and elements (c, k) of modes are those of a solid."""
+    same_nodes = np.array_equal(grid, solid.node_grid)
+    if not (same_nodes and np.array_equal(cells, solid.connectivity)):
         raise UserError(
             f"{name}: modes of another mesh ({len(grid):,} nodes), expected the one to solve "
-            f"({mesh.n_nodes:,} nodes) with any material"
+            f"({solid.n_nodes:,} nodes) with any material"
         )
 
 

@@ -5,16 +5,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array
-from carillon.fem.block import ALL_FILLED, NODES
-from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.block import ALL_FILLED
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
-from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, octant_weights
 from carillon.fem.geometry import CORNER_OFFSETS, HexMesh
 from carillon.fem.geometry.hanging import kinds_of_cells, makes_sense, node_places
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import at_points
 from carillon.files.datasets import INTEGER, number, put, read, refused
 from carillon.limits import EDGES
+from solver.files.cells_group import (
+    FINITE_CELLS,
+    get_cells,
+    get_voxel_nodes,
+    has_voxel_nodes,
+    older_voxels,
+    put_cells,
+)
 from solver.files.regions_group import (
     get_regions,
     get_shared,
@@ -24,15 +30,12 @@ from solver.files.regions_group import (
     put_supports,
 )
 
-FINITE_CELLS = "finite_cells"
-"""Name of the group of a solid of finite cells."""
-
 
 def put_model(group: h5py.Group, model: Solid) -> None:
     """Write a solid, from which K and M can be assembled again."""
     mesh = model.mesh
-    put(group, "nodes", mesh.nodes, "m", "positions of the nodes")
-    put(group, "node_grid", mesh.node_grid, "1", "integer coordinates of the nodes")
+    put(group, "nodes", model.positions, "m", "positions of the nodes")
+    put(group, "node_grid", model.node_grid, "1", "integer coordinates of the nodes")
     put(group, "cells", mesh.cells, "1", "node numbers of the cells, corners in bit order")
     put(group, "grid", mesh.grid, "1", "integer coordinates of the cells")
     put_regions(group, model.regions, model.region)
@@ -44,19 +47,11 @@ def put_model(group: h5py.Group, model: Solid) -> None:
         put(group, "hanging", mesh.hanging, "1", "bit pattern of the cell's corners that hang")
     if isinstance(model, FiniteCellModel):
         put(group, "young", model.young, "Pa", "Young's modulus per voxel")
-        inner = group.create_group(FINITE_CELLS)
-        _put_cells(inner, model.cells)
-        put_shared(inner, model.shared)
+        put_cells(group, model.cells)
+        put_shared(group[FINITE_CELLS], model.shared)
     else:
         assert isinstance(model, ElasticModel)
         _put_elements(group, model)
-
-
-def _put_cells(group: h5py.Group, cells: FiniteCells) -> None:
-    put(group, "nodes", cells.nodes, "1", "node numbers of the finite cells, x fastest")
-    put(group, "voxels", cells.voxels, "1", "voxels of their octants, -1 where empty")
-    put(group, "row", cells.row, "1", "row of the weights of each finite cell")
-    put(group, "weights", cells.weights, "1", "integrals of the points' Lagrange polynomials")
 
 
 def _put_elements(group: h5py.Group, model: ElasticModel) -> None:
@@ -76,7 +71,7 @@ def get_model(group: h5py.Group) -> Solid:
     if FINITE_CELLS in group:
         return _finite_cell_model(group)
     grid = _grid(group)
-    mesh = _mesh(group, grid, *_sizes(group, grid))
+    mesh = _mesh(group, grid, _node_grid(group), *_sizes(group, grid))
     if not _are_corners(mesh):
         raise refused(group, "cells, nodes and their places on the grid do not fit each other")
     fill = read(group, "fill", (mesh.n_cells,), INTEGER).astype(np.uint8)
@@ -101,11 +96,20 @@ def _grid(group: h5py.Group) -> NDArray[np.int32]:
     return read(group, "grid", (None, 3), INTEGER).astype(np.int32)
 
 
-def _mesh(group: h5py.Group, grid: NDArray[np.int32], *sizes: NDArray[np.uint8]) -> HexMesh:
+def _node_grid(group: h5py.Group) -> NDArray[np.int32]:
+    return read(group, "node_grid", (None, 3), INTEGER).astype(np.int32)
+
+
+def _mesh(
+    group: h5py.Group,
+    grid: NDArray[np.int32],
+    node_grid: NDArray[np.int32],
+    *sizes: NDArray[np.uint8],
+) -> HexMesh:
     return HexMesh(
         read(group, "cells", (len(grid), 8), INTEGER).astype(np.int32),
         grid,
-        read(group, "node_grid", (None, 3), INTEGER).astype(np.int32),
+        node_grid,
         _origin(group),
         number(group, "cell_edge", *EDGES),
         *sizes,
@@ -113,24 +117,19 @@ def _mesh(group: h5py.Group, grid: NDArray[np.int32], *sizes: NDArray[np.uint8])
 
 
 def _finite_cell_model(group: h5py.Group) -> FiniteCellModel:
-    grid, inner = _grid(group), group[FINITE_CELLS]
-    mesh = _mesh(group, grid, *_sizes(group, grid))
-    nodes = read(inner, "nodes", (None, len(NODES)), INTEGER).astype(np.int32)
-    row = read(inner, "row", (len(nodes),), INTEGER).astype(np.int32)
-    voxels = read(inner, "voxels", (len(nodes), OCTANTS), INTEGER).astype(np.int32)
-    weights = read(inner, "weights", (None, OCTANTS, POINTS))
-    if not len(weights) or not np.allclose(weights[0], octant_weights()):
-        raise refused(inner, "row 0 of 'weights' is not that of a cell all inside")
-    if row.min(initial=0) < 0 or row.max(initial=0) >= len(weights):
-        raise refused(inner, "dataset 'row' names weights that are not there")
-    cells = FiniteCells(nodes, voxels, row, weights, mesh)
-    if not cells.is_consistent():
-        raise refused(inner, "cells, voxels, nodes and their places do not fit each other")
+    grid, node_grid = _grid(group), _node_grid(group)
+    if has_voxel_nodes(group):
+        mesh = _mesh(group, grid, get_voxel_nodes(group))
+    else:
+        mesh = older_voxels(group, _mesh(group, grid, node_grid, *_sizes(group, grid)))
+    if not _are_corners(mesh):
+        raise refused(group, "voxels, corners and their places on the grid do not fit each other")
+    cells, older = get_cells(group, mesh, node_grid)
     return finite_cell_model(
         cells,
-        read(group, "young", (mesh.n_cells,)),
-        *get_regions(group, (mesh.n_cells,)),
-        get_shared(inner, cells, group),
+        read(group, "young", (cells.mesh.n_cells,)),
+        *get_regions(group, (cells.mesh.n_cells,)),
+        get_shared(group[FINITE_CELLS], cells, group, older),
         get_supports(group),
     )
 

@@ -12,6 +12,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.walls import SIDES, WallSize
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.files.datasets import find, finite, put, read, refused
 from carillon.files.hdf5 import create_h5, open_h5
@@ -56,6 +57,12 @@ class ModesFile:
     def mesh(self) -> HexMesh:
         """Mesh of the model."""
         return self.model.mesh
+
+    @property
+    def wall(self) -> WallSize | None:
+        """The wall that the solid is, as its file says; None if its mesh encloses it."""
+        thickness, side = (self.attributes.get(name) for name in ("wall", "wall_side"))
+        return WallSize(float(thickness), str(side)) if thickness and side in SIDES else None
 
 
 def write_modes(

@@ -8,12 +8,12 @@ from carillon.errors import UserError
 from carillon.fem.elasticity import Elasticity, require_elasticity
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.kinks import Borders
-from carillon.fem.finite_cells.shapes import OCTANTS, POINTS
 from carillon.fem.finite_cells.shared_cells import SharedCells
 from carillon.fem.regions import Damping, RegionOf, Regions
 from carillon.fem.supports import Supports
 from carillon.files.datasets import INTEGER, number, put, read, refused
 from carillon.limits import DENSITIES, MODULI, POISSON
+from solver.files.cells_group import OlderCells
 
 REGIONS, SHARED, SUPPORTS = "regions", "shared", "supports"
 """Names of the groups of several materials, of what finite cells share, and of supports."""
@@ -96,32 +96,38 @@ def put_shared(group: h5py.Group, shared: SharedCells | None) -> None:
     if shared is None:
         return
     inner = group.create_group(SHARED)
-    put(inner, "cell", shared.cell, "1", "cell of each part")
-    put(inner, "octant", shared.octant, "1", "octant of each part")
+    put(inner, "portion", shared.portion, "1", "row of the cells' parts of voxels")
     put(inner, "region", shared.region, "1", "region of each part")
     put(inner, "weights", shared.weights, "1", "integrals of the points' Lagrange polynomials")
     for name, meaning in _BORDERS.items():
         put(inner, f"border_{name}", getattr(shared.borders, name), "1", meaning)
 
 
-def get_shared(group: h5py.Group, cells: FiniteCells, solid: h5py.Group) -> SharedCells | None:
-    """The parts that several regions share; raises UserError if they make no sense."""
+def get_shared(
+    group: h5py.Group, cells: FiniteCells, solid: h5py.Group, older: OlderCells | None
+) -> SharedCells | None:
+    """The parts that several regions share; raises UserError if they make no sense.
+
+    `older` tells the places of octants in files of older versions.
+    """
     if SHARED not in group:
         return None
     if REGIONS not in solid:
         raise refused(group, "has shared cells of one material")
     inner, count = group[SHARED], len(solid[REGIONS]["density"])
-    cell = read(inner, "cell", (None,), INTEGER)
-    octant, region = (read(inner, name, (len(cell),), INTEGER) for name in ("octant", "region"))
-    weights = read(inner, "weights", (len(cell), POINTS))
-    limits = ((cell, len(cells)), (octant, OCTANTS), (region, count))
-    if any(_beyond(each, most) for each, most in limits):
-        raise refused(inner, "names cells, octants or materials that are not there")
-    if (cells.voxels[cell, octant] < 0).any():
-        raise refused(inner, "has parts in empty octants")
+    region = read(inner, "region", (None,), INTEGER)
+    if older is None:
+        portion = read(inner, "portion", (len(region),), INTEGER)
+    else:
+        cell, octant = (read(inner, name, (len(region),), INTEGER) for name in ("cell", "octant"))
+        if _beyond(cell, len(cells)) or _beyond(octant, 8):
+            raise refused(inner, "names cells or octants that are not there")
+        portion = older.portion[cell, octant]
+    weights = read(inner, "weights", (len(region), cells.basis.n_points))
+    if _beyond(portion, len(cells.cell)) or _beyond(region, count):
+        raise refused(inner, "names cells, voxels or materials that are not there")
     return SharedCells(
-        cell.astype(np.int64),
-        octant.astype(np.int64),
+        portion.astype(np.int64),
         region.astype(np.uint16),
         weights,
         _get_borders(inner, len(cells), count),

@@ -13,8 +13,8 @@ from solver.analysis.options import SolverOptions
 from solver.analysis.phases import RankClock
 from solver.refinement.inverse_iteration import FineStart
 
-ESTIMATE_TOLERANCE = 1e-4
-"""Relative error of the eigenvalues with which those of voxels are compared."""
+ESTIMATE_TOLERANCE = 1e-7
+"""Relative error of the eigenvalues of models for estimates, whose residuals show larger ones."""
 INITIAL = "initial modes"
 """Phase that finds what an analysis starts from."""
 

@@ -75,5 +75,5 @@ def _ruling_modes(truth: ModesFile, surface: Surface) -> tuple[Array, Array]:
     if surface.nodes is None:
         motion = motion_at(truth.model, modes, surface.points)
     else:
-        motion = modes.reshape(truth.mesh.n_nodes, 3, -1)[surface.nodes]
+        motion = modes.reshape(truth.model.n_nodes, 3, -1)[surface.nodes]
     return motion, truth.eigenvalues[chosen]

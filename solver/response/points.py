@@ -5,14 +5,24 @@ import scipy.sparse as sp
 
 from carillon.arrays import Array
 from carillon.fem.embedding import embedding
+from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import Solid
 
 
 def motion_at(model: Solid, modes: Array, points: Array) -> Array:
     """Displacement (p, 3, k) of `points` (p, 3) [m] in modes (n_dofs, k)."""
     values = interpolation(model, points)
-    motion = values @ modes.reshape(model.mesh.n_nodes, -1)
+    motion = values @ modes.reshape(model.n_nodes, -1)
     return np.asarray(motion).reshape(values.shape[0], 3, -1)
+
+
+def voxel_motion(model: Solid, modes: Array) -> Array:
+    """Motion (3 n, ...) of the corners of voxels, `model.mesh`, in modes (n_dofs, ...)."""
+    if not isinstance(model, FiniteCellModel):
+        return modes
+    values = interpolation(model, model.mesh.nodes)
+    moved = values @ modes.reshape(model.n_nodes, -1)
+    return np.asarray(moved).reshape(-1, *modes.shape[1:])
 
 
 def forces_at(model: Solid, points: Array, directions: Array) -> Array:
@@ -38,7 +48,7 @@ def interpolation(model: Solid, points: Array) -> sp.csr_matrix:
     """
     elements, weights = embedding(model, points)
     rows = np.repeat(np.arange(len(elements)), weights.shape[1])
-    shape = (len(elements), model.mesh.n_nodes)
+    shape = (len(elements), model.n_nodes)
     nodes = model.connectivity[elements]
     matrix = sp.csr_matrix((weights.ravel(), (rows, nodes.ravel())), shape=shape)
     matrix.eliminate_zeros()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array
-from carillon.fem.model import Solid
+from carillon.fem.model import ElasticModel, Solid
 
 NEIGHBOURHOOD = 2.0
 """Edge of the regions that vibrate as one material, in edges of a mode's share of the solid."""
@@ -54,6 +54,7 @@ class CountingLaw:
         surface = max(exposed, (SPHERE * volume**2) ** (1.0 / 3.0))
         size = NEIGHBOURHOOD * (mesh.n_cells / number) ** (1.0 / 3.0)
         if young.ndim == 2:
+            assert isinstance(solid, ElasticModel)
             # Of a cell that is partly void modulus and mass are less.
             young = young.mean(axis=1) / solid.filled.mean(axis=1)
         poisson = solid.poisson

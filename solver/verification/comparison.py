@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from carillon.arrays import Array
+from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import blocks_with_coarse, prolongation
 from carillon.fem.model import ElasticModel, Solid
 from carillon.files.paths import by_stem
@@ -16,6 +17,7 @@ from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
 from solver.response.points import interpolation
 from solver.subspace.weyl import clusters
+from solver.verification.fitted import fitted
 from solver.verification.matching import (
     AUDIBLE_LAST,
     SAME,
@@ -179,16 +181,19 @@ def _cluster_angles(
 def on_mesh_of(fine: ModesFile, file: ModesFile) -> Array:
     """Modes of `file` on the nodes of `fine`, as far as that mesh can tell them.
 
-    Those of a coarsening are prolonged, and those of any other mesh or discretisation interpolated.
+    Those of a coarsening are prolonged, and those of any other mesh or discretisation interpolated;
+    on finite cells, whose nodes may be outside the solid, fitted inside it.
     """
     assert file.modes is not None
     if on_one_mesh(file.model, fine.model):
         return file.modes
+    if isinstance(fine.model, FiniteCellModel):
+        return fitted(fine.model, file.model, file.modes)
     blocks = None
     if isinstance(fine.model, ElasticModel) and isinstance(file.model, ElasticModel):
         blocks = blocks_with_coarse(fine.mesh, file.mesh)
     if blocks is None:
-        nodal = interpolation(file.model, fine.mesh.nodes)
+        nodal = interpolation(file.model, fine.model.positions)
     else:
         nodal = prolongation(blocks)
     return np.asarray(sp.kron(nodal, sp.identity(3), format="csr") @ file.modes)
@@ -204,7 +209,7 @@ def _laws(solid: Solid) -> dict[str, Any]:
 def on_one_mesh(one: Solid, other: Solid) -> bool:
     """Whether two solids have the same elements and nodes."""
     return np.array_equal(one.connectivity, other.connectivity) and np.array_equal(
-        one.mesh.node_grid, other.mesh.node_grid
+        one.node_grid, other.node_grid
     )
 
 

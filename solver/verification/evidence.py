@@ -86,7 +86,7 @@ def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:
     value, expected = gap_below_last(values, max(GAP, GAP_OF_TOLERANCE * tolerance), rigid)
     return ModesEvidence(
         len(values),
-        file.mesh.n_dofs,
+        file.model.n_dofs,
         float(residuals.max()),
         float(np.median(residuals)),
         _energy_residuals(K, M, values, modes, residuals, rigid).tolist(),

@@ -13,9 +13,10 @@ from carillon.errors import UserError
 from carillon.fem.elasticity import Elasticity
 from carillon.fem.element import matrix_of, quadrature_stiffness
 from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.hanging import node_weights
 from carillon.fem.finite_cells.kinks import Borders
+from carillon.fem.finite_cells.matrices import strain_factors
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
-from carillon.fem.finite_cells.shapes import POINTS, strain_factors
 from carillon.fem.geometry import HexMesh, blocks_from_mesh
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.fem.regions import RegionOf, Regions
@@ -209,26 +210,26 @@ class _CellElements(AnalysedElements):
         self, cells: FiniteCells, placed: PlacedRegions, supports: Supports | None
     ) -> None:
         ones = np.ones(cells.mesh.n_cells)
-        self._cells = cells
         self.model = finite_cell_model(
             cells, ones, placed.regions, placed.region, placed.shared, supports
         )
         elements = self.model.elements
         self._slots: list[Index] = []
         self.parts: list[RegionElements] = []
-        if elements.law is None:
-            self.parts.append(RegionElements(0, slice(None)))
-            return
+        law = elements.law
+        if law is None:
+            law = np.zeros((len(elements), 1), dtype=np.uint16)
         there = elements.shares.any(axis=2)
         if elements.kinks is not None:
-            self._add_kinks(elements.kinks.borders, elements.law)
+            self._add_kinks(elements.kinks.borders, law)
             for part, slot in zip(self.parts, self._slots, strict=True):
                 there[part.cells, slot] = False
-        for number in np.unique(elements.law):
-            cell, slot = np.nonzero(there & (elements.law == number))
-            if len(cell):
-                self._slots.append(slot)
-                self.parts.append(RegionElements(int(number), cell))
+        for number in np.unique(law):
+            cell, slot = np.nonzero(there & (law == number))
+            for kind in np.unique(elements.kinds[cell]):
+                own = elements.kinds[cell] == kind
+                self._slots.append(slot[own])
+                self.parts.append(RegionElements(int(number), cell[own]))
 
     def _add_kinks(self, borders: Borders, law: RegionOf) -> None:
         """Add the two sides of each cell that has a kink, whose strains are its own."""
@@ -239,21 +240,23 @@ class _CellElements(AnalysedElements):
                 self.parts.append(RegionElements(int(region), own, (number, side)))
 
     def slopes(self, young: Array, directions: Array) -> list[Array]:
-        if self.model.region is None:
-            columns = [self._cells.point_values(along).ravel() for along in directions.T]
-            return [np.stack(columns, axis=1)]
         # The stiffness is linear in the moduli, so that directions are moduli, too.
-        found = [np.empty((POINTS * len(slot), directions.shape[1])) for slot in self._slots]
+        cells = self.model.cells
+        count = directions.shape[1]
+        found = [np.empty((cells.basis.n_points * len(slot), count)) for slot in self._slots]
         for column, along in enumerate(directions.T):
-            moduli = self.model.linear_moduli(along)
+            moduli = self.model.linear_moduli(along) * cells.edges[:, None, None]
             for part, slot, own in zip(self.parts, self._slots, found, strict=True):
                 own[:, column] = moduli[part.cells, slot].ravel()
         return found
 
     def strains(self, part: RegionElements, law: Law) -> Array:
-        scale = np.sqrt(2.0 * self.model.mesh.edge)
-        kinks = self.model.elements.kinks
-        if part.kink is None or kinks is None:
-            return scale * strain_factors(law)
-        root = np.linalg.cholesky(matrix_of(law)).T
-        return np.asarray(scale * (root @ kinks.whole_strains(*part.kink)))
+        degree, elements = self.model.cells.degree, self.model.elements
+        factors = strain_factors(degree, law)
+        if part.kink is not None and elements.kinks is not None:
+            root = np.linalg.cholesky(matrix_of(law)).T
+            factors = root @ elements.kinks.whole_strains(*part.kink)
+        kind = int(elements.kinds[part.cells][0])
+        if kind:
+            factors = factors @ np.kron(node_weights(degree, kind), np.eye(3))
+        return np.asarray(factors)

@@ -45,7 +45,7 @@ def nodal_mass(model: Solid, rows: Sequence[int]) -> sp.csr_matrix:
     nodes = model.connectivity
     width = nodes.shape[1]
     places = np.repeat(nodes, width, axis=1).ravel(), np.tile(nodes, width).ravel()
-    matrix = sp.csr_matrix((mass.ravel(), places), shape=(model.mesh.n_nodes,) * 2)
+    matrix = sp.csr_matrix((mass.ravel(), places), shape=(model.n_nodes,) * 2)
     matrix.eliminate_zeros()
     return matrix
 

@@ -115,7 +115,7 @@ def prepared_solid(
     that are not for all Poisson's ratios that are free.
     """
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
-    loaded = SolidSurface.read(solid.mesh, solid.unit)
+    loaded = SolidSurface.read(solid.mesh, solid.unit, solid.wall_size)
     mesh, cells = discretised(loaded, solid)
     loaded.doubt_unit()
     finite = None if cells is None else cells.cells

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from carillon import __version__
-from carillon.arrays import Array, Index, Surface
+from carillon.arrays import Array, Index
 from carillon.composition.composition import Composition, PlacedRegions
 from carillon.composition.entries import CompositionEntry, SolidFrame, compose
 from carillon.composition.materials import NamedMaterial
@@ -23,6 +23,7 @@ from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid, fine_model
 from carillon.fem.regions import Damping as Coefficients
 from carillon.fem.regions import Regions
+from solver.analysis.solid_surface import SolidSurface
 from sound.scenes.scene import ObjectEntry
 from sound.scenes.solved import Discretised, SolvedSolid, discretised, kept, with_modes
 from sound.scenes.touched import touched_material
@@ -40,8 +41,9 @@ class ComposedObject:
     Raises UserError for regions or supports that describe nothing.
     """
 
-    def __init__(self, entry: ObjectEntry, surface: Surface) -> None:
-        self._entry, self._surface = entry, surface
+    def __init__(self, entry: ObjectEntry, given: SolidSurface) -> None:
+        surface = given.triangles
+        self._entry, self._surface, self._inside = entry, surface, given.solid
         rest = None
         if entry.material is not None:
             own = entry.made_of
@@ -72,14 +74,14 @@ class ComposedObject:
         Raises UserError if it cannot be made, and ConvergenceError if modes were not found.
         """
         name = self._entry.name
-        solid = discretised(self._surface, name, how, self._made)
+        solid = discretised(self._inside, name, how, self._made)
         if how.count == 0:
             return solid
         key = hashlib.sha256(repr((__version__, _VERSION, how)).encode())
         for part in _content(solid.model):
             key.update(np.ascontiguousarray(part).tobytes())
         found = kept(
-            key.hexdigest(), lambda: with_modes(self._surface, name, how, self._made, solid)
+            key.hexdigest(), lambda: with_modes(self._inside, name, how, self._made, solid)
         )
         return replace(found, model=solid.model)  # files do not name the region if there is one
 
@@ -135,10 +137,11 @@ def _content(model: Solid) -> list[Array]:
     if model.region is not None:
         parts.append(model.region)
     if isinstance(model, FiniteCellModel):
-        parts += [model.cells.voxels, model.cells.row, model.cells.weights]
+        cells = model.cells
+        parts += [cells.nodes, cells.cell, cells.place, cells.row, cells.weights]
         if model.shared is not None:
             shared = model.shared
-            parts += [shared.cell, shared.octant, shared.region, shared.weights]
+            parts += [shared.portion, shared.region, shared.weights]
     if model.supports is not None:
         held = model.supports
         parts += [held.positions, held.stiffness, held.mass]

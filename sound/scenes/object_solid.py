@@ -10,9 +10,11 @@ from carillon.arrays import Array, Integers, Surface
 from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError
 from carillon.fem.geometry.size import doubt_unit
+from carillon.fem.geometry.walls import Wall, WallSize
 from carillon.fem.model import RIGID_MODES, MassProperties, Solid, mass_properties
 from carillon.files.hdf5 import kind_of
 from carillon.limits import EXTENTS
+from solver.analysis.solid_surface import SolidSurface
 from solver.files.modes_file import ModesFile, read_modes, require_same_solid
 from solver.refinement.errors import FROM_SOLID
 from solver.response.response import Damping
@@ -198,14 +200,17 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
 
 
 def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
-    from carillon.fem.geometry import load_surface
     from sound.strikes import longest_side, struck_surface
 
-    surface = struck_surface(mesh, entry.unit)
+    wall = entry.wall_size
+    surface = struck_surface(mesh, entry.unit, wall=wall)
     # In the mesh's own unit, so that objects which differ by unit alone share their modes.
     longest = longest_side(surface) / entry.unit
     unit = 1.0 if EXTENTS[0] <= longest <= EXTENTS[1] else entry.unit
-    solid, factor = _uniform(load_surface(mesh, unit), entry, entry.unit / unit)
+    size = entry.unit / unit
+    if wall is not None:
+        wall = WallSize(wall.thickness / size, wall.side)
+    solid, factor = _uniform(SolidSurface.read(mesh, unit, wall).solid, entry, size)
     doubt_unit(mesh, surface.extents, entry.unit)
     surface.apply_scale(factor)
     return ObjectSolid(
@@ -224,12 +229,11 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
 
 def _of_parts(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     """The solid of a mesh of several regions, or that something holds."""
-    from carillon.fem.geometry import load_surface
     from sound.strikes import struck_surface
 
-    given = load_surface(mesh, entry.unit)
+    given = SolidSurface.read(mesh, entry.unit, entry.wall_size)
     composed = ComposedObject(entry, given)
-    surface = struck_surface(mesh, entry.unit, composed.parts_of)
+    surface = struck_surface(mesh, entry.unit, composed.parts_of, entry.wall_size)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
     which = composed.parts_of(vertices, faces)
     solid = composed.solid(_how(entry))
@@ -260,8 +264,10 @@ def _how(entry: ObjectEntry) -> Discretised:
     return Discretised(entry.discretisation, entry.resolution, entry.components, entry.count)
 
 
-def _uniform(surface: Surface, entry: ObjectEntry, size: float) -> tuple[UniformSolid, float]:
-    """The solid inside a surface of size 1, at a size; and the factor of the entry's pitch."""
+def _uniform(
+    surface: Surface | Wall, entry: ObjectEntry, size: float
+) -> tuple[UniformSolid, float]:
+    """The solid of a surface of size 1, at a size; and the factor of the entry's pitch."""
     material = entry.made_of
     solid = uniform_solid(surface, entry.name, _how(entry), material.poisson)
     return solid.sized(size, material.young, material.density, entry.pitch)

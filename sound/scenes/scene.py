@@ -10,6 +10,7 @@ from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.composition.entries import RegionEntry, SupportEntry
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.errors import UserError
+from carillon.fem.geometry.walls import WallSize
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.documents import parameters_from, read_parameters
 from carillon.parameters.fields import parameters_of
@@ -22,6 +23,8 @@ from carillon.parameters.quantities import (
     Resolution,
     ShownName,
     Triple,
+    WallSide,
+    WallThickness,
     between,
 )
 from carillon.parameters.sentences import ParameterError
@@ -41,6 +44,8 @@ _SUITS = {
     "heard_modes": ("modes",),
     "damping": ("modes", "mesh", "radius"),
     "discretisation": ("mesh", "radius"),
+    "wall": ("mesh",),
+    "wall_side": ("mesh",),
     "components": ("mesh", "radius"),
     "regions": ("mesh", "modes", "design"),
     "supports": ("mesh",),
@@ -124,6 +129,8 @@ class ObjectEntry:
         "thinner than a spacing, voxel makes them as thick as one; auto is finite-cell, or voxel "
         "where finite cells refuse the mesh",
     )
+    wall: WallThickness | None = option(None)
+    wall_side: WallSide = option("about")
     components: Components = option(
         "error", "what comes of a mesh in several pieces; largest keeps the largest"
     )
@@ -187,6 +194,11 @@ class ObjectEntry:
             default = parameters_of(ObjectEntry)[key].default
             if source not in sources and getattr(self, key) != default:
                 raise ValueError(f"{key} goes with {' or '.join(sources)}, found a {source}")
+        if self.wall is not None and self.discretisation == "voxel":
+            raise ValueError(
+                "a wall is of finite cells; take discretisation auto or finite-cell, or leave out "
+                "the wall"
+            )
         if self.pitch is not None and self.count == 0:
             raise ValueError("pitch goes with a count of modes above 0; what is silent has none")
         if self.material is None and source in ("mesh", "radius") and not self.regions:
@@ -216,6 +228,11 @@ class ObjectEntry:
                 "pitch scales a mesh, which springs, pads and masses do not follow; leave out "
                 "pitch, or hold it without them"
             )
+
+    @property
+    def wall_size(self) -> WallSize | None:
+        """The wall that a mesh stands for; None if it is what the mesh encloses."""
+        return None if self.wall is None else WallSize(self.wall, self.wall_side)
 
     @cached_property
     def made_of(self) -> NamedMaterial:

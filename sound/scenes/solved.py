@@ -16,12 +16,13 @@ from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.bridges import say_bridged
+from carillon.fem.geometry.walls import Wall
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
 from carillon.files.cache import remembered
 from carillon.processes.threads import one_thread
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.voxels import Reference, covering_on, voxel_lattice
-from solver.analysis.problem import AUTO
+from solver.analysis.problem import AUTO, WALL_OF_VOXELS
 from solver.files.modes_file import read_modes, write_modes
 from solver.refinement.errors import FROM_SOLID, LAST, ExpectedErrors
 from solver.response.response import Damping
@@ -109,14 +110,15 @@ def resized(model: Solid, size: float) -> Solid:
         places, stiffness = size * supports.positions, size * supports.stiffness
         supports = replace(supports, positions=places, stiffness=stiffness)
     if isinstance(model, FiniteCellModel):
-        cells = replace(model.cells, mesh=larger(model.cells.mesh))
+        whole = model.cells
+        cells = replace(whole, step=size * whole.step, mesh=larger(whole.mesh))
         return replace(model, cells=cells, supports=supports)
     assert isinstance(model, ElasticModel)
     return replace(model, mesh=larger(model.mesh), supports=supports)
 
 
-def discretised(surface: Surface, name: str, how: Discretised, made: Made) -> SolvedSolid:
-    """The solid inside a surface, without modes.
+def discretised(surface: Surface | Wall, name: str, how: Discretised, made: Made) -> SolvedSolid:
+    """The solid inside a surface, or its wall, without modes.
 
     Raises UserError if the surface encloses nothing, walls too thin, or several pieces.
     """
@@ -127,7 +129,7 @@ def discretised(surface: Surface, name: str, how: Discretised, made: Made) -> So
         if how.discretisation == VOXEL:
             hint = "finite cells (discretisation: auto) take walls thinner than a voxel"
             raise UserError(f"{error}; {hint}") from None
-        if how.discretisation == FINITE_CELL:
+        if how.discretisation == FINITE_CELL or isinstance(surface, Wall):
             raise
         chosen = VOXEL
         try:
@@ -139,19 +141,21 @@ def discretised(surface: Surface, name: str, how: Discretised, made: Made) -> So
 
 
 def _meshed(
-    surface: Surface, name: str, how: Discretised, discretisation: str
+    surface: Surface | Wall, name: str, how: Discretised, discretisation: str
 ) -> HexMesh | FiniteCells:
     if discretisation == FINITE_CELL:
         from carillon.fem.finite_cells.build import finite_cells  # Its import takes long.
 
         return finite_cells(surface, how.resolution, how.components, name)
+    if isinstance(surface, Wall):
+        raise UserError(WALL_OF_VOXELS)
     voxels = voxelize(surface, how.resolution, components=how.components, name=name)
     say_bridged(surface, voxels)
     return hexmesh_from_voxels(voxels)
 
 
 def with_modes(
-    surface: Surface, name: str, how: Discretised, made: Made, solid: SolvedSolid
+    surface: Surface | Wall, name: str, how: Discretised, made: Made, solid: SolvedSolid
 ) -> SolvedSolid:
     """A discretised solid with `how.count` elastic modes.
 
@@ -175,7 +179,7 @@ def with_modes(
 
 
 def _expected(
-    surface: Surface,
+    surface: Surface | Wall,
     name: str,
     how: Discretised,
     made: Made,
@@ -186,6 +190,7 @@ def _expected(
     """Expected errors of frequencies; those of voxels by finite cells on their lattice."""
     if isinstance(model, FiniteCellModel):
         return estimate_cell_errors(model, values, modes).errors
+    assert not isinstance(surface, Wall)
     from solver.analysis.library import solve
 
     lattice = voxel_lattice(surface, how.resolution)

@@ -17,6 +17,7 @@ from carillon.arrays import Surface
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import HexMesh
+from carillon.fem.geometry.walls import Wall
 from carillon.fem.model import Solid, fine_model
 from carillon.fem.regions import Regions
 from sound.scenes.solved import Discretised, SolvedSolid, discretised, kept, resized, with_modes
@@ -58,8 +59,10 @@ class UniformSolid(SolvedSolid):
         return self.scaled(factor * size, young, density), factor
 
 
-def uniform_solid(surface: Surface, name: str, how: Discretised, poisson: float) -> UniformSolid:
-    """The solid inside a surface, of `YOUNG`, `DENSITY` and a Poisson's ratio, and its modes.
+def uniform_solid(
+    surface: Surface | Wall, name: str, how: Discretised, poisson: float
+) -> UniformSolid:
+    """The solid of a surface, of `YOUNG`, `DENSITY` and a Poisson's ratio, and its modes.
 
     Raises UserError if the surface encloses nothing, walls too thin, or several pieces, and
     ConvergenceError if modes were not found.
@@ -74,8 +77,11 @@ def uniform_solid(surface: Surface, name: str, how: Discretised, poisson: float)
     if how.count == 0:
         return _uniform(discretised(surface, name, how, made))
     key = hashlib.sha256(repr((__version__, _VERSION, how, poisson)).encode())
-    key.update(np.asarray(surface.vertices, dtype="<f8").tobytes())
-    key.update(np.asarray(surface.faces, dtype="<i8").tobytes())
+    if isinstance(surface, Wall):
+        key.update(repr(surface.size).encode())
+    triangles = surface.surface if isinstance(surface, Wall) else surface
+    key.update(np.asarray(triangles.vertices, dtype="<f8").tobytes())
+    key.update(np.asarray(triangles.faces, dtype="<i8").tobytes())
 
     def solved() -> SolvedSolid:
         return with_modes(surface, name, how, made, discretised(surface, name, how, made))

@@ -5,7 +5,14 @@ import argparse
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.quantities import PoissonRatio, Positive
 from solver.analysis.problem import ProblemOptions
-from solver.commands.running import COMPOSED, add_outputs, on_ranks, require_outputs, tell_measured
+from solver.commands.running import (
+    COMPOSED,
+    WALL,
+    add_outputs,
+    on_ranks,
+    require_outputs,
+    tell_measured,
+)
 from solver.refinement.errors import ALLOWED_ERROR
 from studies.coarsening.ratios import RATIOS, lines_of, rate_ratios
 
@@ -17,7 +24,7 @@ EXAMPLES = """example:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     parser.add_argument("mesh", nargs="+", help="surface mesh files, or builtin:NAME")
-    own = ("mesh", "poisson", "coarsen", "objective", "discretisation", *COMPOSED)
+    own = ("mesh", "poisson", "coarsen", "objective", "discretisation", *WALL, *COMPOSED)
     add_options(parser, ProblemOptions, leave_out=own)
     parser.add_argument(
         "--ratios",

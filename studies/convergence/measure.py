@@ -104,7 +104,7 @@ def _exact(model: Solid | None, modes: int, truth: str | Path | None, comm: MPI.
 
 def _read_exact(model: Solid, modes: int, truth: str | Path) -> Array:
     file = read_modes(truth, with_modes=False)
-    available, unknowns = len(file.eigenvalues), file.mesh.n_dofs
+    available, unknowns = len(file.eigenvalues), file.model.n_dofs
     if available < modes or unknowns != model.n_dofs:
         raise UserError(
             f"{truth}: {available:,} modes of {unknowns:,} unknowns, expected {modes:,} or more of "

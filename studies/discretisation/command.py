@@ -11,6 +11,7 @@ from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
 from solver.commands.running import (
     COMPOSED,
+    WALL,
     add_solid,
     on_ranks,
     parameters,
@@ -26,7 +27,7 @@ EXAMPLES = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_solid(parser, "coarsen", "objective", "discretisation", "fill", "lumped", *COMPOSED)
+    add_solid(parser, "coarsen", "objective", "discretisation", "fill", "lumped", *WALL, *COMPOSED)
     parser.add_argument(
         "--modes",
         type=reader(Annotated[int, between(RIGID_MODES + 1, 1000)]),

@@ -6,15 +6,30 @@ go on into such a part instead (aggregated finite elements, Badia, Verdugo and M
 integrals over it are added to the neighbour's, of whose polynomials nothing is lost.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+
 import numpy as np
 
 from carillon.arrays import Array, Flags, Index
-from carillon.fem.element import CORNERS
+from carillon.fem.finite_cells.basis import Basis
 from carillon.fem.finite_cells.joining import Faces
-from carillon.fem.finite_cells.shapes import OCTANTS, POINTS, points, polynomials
 
 FARTHEST = 3
 """Cells away from a part that one may be that takes it in."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What cells have of voxels, all of whose arrays have a row for each, ordered by cell."""
+
+    cell: Index
+    """(e,)."""
+    middle: Array
+    """(e, 3) of the voxel, in the cell from 0 to 1."""
+    row: Index
+    """(e,) of the weights."""
 
 
 def hosts(faces: Faces, slight: Flags, volumes: Array) -> Index:
@@ -23,8 +38,7 @@ def hosts(faces: Faces, slight: Flags, volumes: Array) -> Index:
     It is the largest among the neighbours, or that takes in a neighbour.
     """
     host = np.where(slight, -1, np.arange(len(slight)))
-    pairs = np.concatenate([faces.alike[:, :2], faces.unlike[:, :2]])
-    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+    pairs = np.concatenate([faces.pairs, faces.pairs[:, ::-1]])
     for _ in range(FARTHEST):
         own, other = pairs[(host[pairs[:, 0]] < 0) & (host[pairs[:, 1]] >= 0)].T
         order = np.argsort(volumes[host[other]], kind="stable")
@@ -33,31 +47,34 @@ def hosts(faces: Faces, slight: Flags, volumes: Array) -> Index:
 
 
 def taken_in(
-    corner: Index, span: Index, host: Index, row: Index, weights: Array
+    basis: Basis, corner: Index, span: Index, host: Index, held: Held, weights: Array
 ) -> tuple[Index, Array]:
-    """Rows (p,) of the parts and the weights (k, 8, 125) with what hosts have taken in.
+    """Rows (e,) and the weights (k, q^3) with what hosts have taken in.
 
-    `corner` (p, 3) and `span` (p,) are lowest corners and edges of the cells; see `hosts`, and
-    of `row` and `weights` `carillon.fem.finite_cells.cells.FiniteCells`.
+    `corner` (p, 3) and `span` (p,) are lowest corners and edges of the cells; see `hosts`.
     """
-    guests = np.flatnonzero((host >= 0) & (host != np.arange(len(host))))
-    if not len(guests):
-        return row, weights
-    to = host[guests]
-    scale = (span[guests] / span[to])[:, None]
-    offset = (corner[guests] - corner[to]) / span[to][:, None]
-    places = offset[:, None] + scale[:, None] * points()
-    values = polynomials(places.reshape(-1, 3)).reshape(len(guests), POINTS, POINTS)
-    moved = scale[:, :, None] ** 3 * (weights[row[guests]] @ values)
-    taking, which = np.unique(to, return_inverse=True)
-    total = weights[row[taking]]
-    filled = (total.sum(axis=2) > 0.0)[which]
-    middles = offset[:, None] + scale[:, None] * (CORNERS + 0.5) / 2.0
-    for octant in range(OCTANTS):
-        # The material of the nearest octant that the host has.
-        far = ((middles[:, octant, None] - (CORNERS + 0.5) / 2.0) ** 2).sum(axis=2)
-        nearest = np.where(filled, far, np.inf).argmin(axis=1)
-        np.add.at(total, (which, nearest), moved[:, octant])
-    row = row.copy()
+    guest = (host >= 0) & (host != np.arange(len(host)))
+    own = np.flatnonzero(guest[held.cell])
+    if not len(own):
+        return held.row, weights
+    cell = held.cell[own]
+    to = host[cell]
+    scale = (span[cell] / span[to])[:, None]
+    offset = (corner[cell] - corner[to]) / span[to][:, None]
+    moved = np.empty((len(own), weights.shape[1]))
+    for number, (shift, factor) in enumerate(zip(offset, scale, strict=True)):
+        values = basis.line_polynomials(shift + factor * basis.line_points)
+        moved[number] = factor**3 * (weights[held.row[own[number]]] @ values)
+    middle = offset + scale * held.middle[own]
+    # The material of the nearest voxel that the host has something of.
+    first, last = (np.searchsorted(held.cell, to, side=side) for side in ("left", "right"))
+    target = np.empty(len(own), dtype=np.int64)
+    for number, (begin, end) in enumerate(zip(first, last, strict=True)):
+        far = ((held.middle[begin:end] - middle[number]) ** 2).sum(axis=1)
+        target[number] = begin + int(far.argmin())
+    taking, which = np.unique(target, return_inverse=True)
+    total = weights[held.row[taking]]
+    np.add.at(total, which.ravel(), moved)
+    row = held.row.copy()
     row[taking] = len(weights) + np.arange(len(taking))
     return row, np.concatenate([weights, total])

@@ -6,20 +6,24 @@ import numpy as np
 
 from carillon.arrays import Surface
 from carillon.errors import UserError
+from carillon.fem.finite_cells.basis import DEGREE, basis
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.cover import cover_of
 from carillon.fem.finite_cells.covering import SMALLEST_PIECE, Covering, pieces
-from carillon.fem.finite_cells.inside import Inside, find_inside
+from carillon.fem.finite_cells.inside import Inside, fills, find_inside
 from carillon.fem.finite_cells.lines import CUT, FULL
 from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.grid import Grid, bounding_grid
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
+from carillon.fem.geometry.walls import Wall
 
 LOST = 1.1
 """Ratio of the volumes by two halves of the lines beyond which parts slip between the lines."""
 SEEN, SURELY_SEEN = 0.03, 0.01
 """Relative error of the volume beyond which the lines are too few for a thin rod or wall, and that
 of a resolution which is proposed."""
+THINNEST = 0.01
+"""Thickness of a wall, over the spacing, below which it is refused."""
 TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Factors by which a resolution is raised in search of one at which nothing is lost, or the solid
 is in one piece."""
@@ -29,11 +33,12 @@ PIECES_GRID = 200_000
 
 
 def covering(
-    surface: Surface,
+    surface: Surface | Wall,
     resolution: int,
     components: str = "error",
     name: str = "mesh",
     grid: Grid | None = None,
+    degree: int = DEGREE,
 ) -> Covering:
     """The cells of a lattice that cover the inside of a surface; see `finite_cells`.
 
@@ -41,75 +46,103 @@ def covering(
     --------
     >>> from carillon.fem.geometry.builtin import builtin_surface
     >>> cover = covering(builtin_surface("bell"), 12)
-    >>> division = cover.divided(cover.cells.grid[:3])
-    >>> len(division.cells) > len(cover.cells)
+    >>> finer = cover.divided([cover.cells.corner[:3] // 4])
+    >>> len(finer) > len(cover.cells)
     True
     """
-    resolution = checked_resolution(surface, resolution, name)
+    triangles = surface.skin if isinstance(surface, Wall) else surface
+    resolution = checked_resolution(triangles, resolution, name)
     if components not in COMPONENTS:
         raise UserError(
             f"components {components!r} is unknown, expected one of {', '.join(COMPONENTS)}"
         )
-    grid = grid or even_grid(surface, resolution)
-    surface = one_body(surface, components, name)
+    grid = whole_cells(grid or cell_grid(surface, resolution, degree), degree)
+    if isinstance(surface, Wall):
+        _require_thick(surface, resolution, grid, name)
+    else:
+        surface = one_body(surface, components, name)
     inside = find_inside(surface, grid)
+    if isinstance(surface, Wall) and fills(surface, inside, grid):
+        surface.say_filled(name)
     if not _holds(inside):
         raise UserError(_lost(surface, inside, resolution, grid, name))
     share = _seen_share(surface, inside, grid)
     if abs(share - 1.0) > SEEN:
         raise UserError(_unseen(surface, share, resolution, grid, name))
-    cover = cover_of(inside)
+    cover = cover_of(inside, basis(degree))
     piece, volumes = pieces(cover)
     kept = np.flatnonzero(volumes >= SMALLEST_PIECE)
     if not len(kept):
         raise UserError(_lost(surface, inside, resolution, grid, name))
     if len(kept) > 1 and components == "error":
         raise UserError(_in_pieces(surface, volumes[kept], resolution, name))
-    return Covering(surface, name, grid, cover, piece == volumes.argmax())
+    return Covering(surface, name, degree, grid, cover, piece == volumes.argmax())
 
 
 def finite_cells(
-    surface: Surface,
+    surface: Surface | Wall,
     resolution: int,
     components: str = "error",
     name: str = "mesh",
     grid: Grid | None = None,
+    degree: int = DEGREE,
 ) -> FiniteCells:
-    """Cover the inside of a surface with quadratic cells.
+    """Cover the inside of a surface, or a wall, with cells of degree 4.
 
     Raises UserError if the resolution is not an integer >= 2 or needs too large a lattice, if the
-    surface encloses nothing, or walls too thin for the lattice, or the solid is in pieces.
+    surface encloses nothing, or walls too thin for the lattice, or the solid is in pieces; if a
+    wall is thinner than `THINNEST` of the lattice's spacing.
 
     Parameters
     ----------
     surface
-        Triangles in metres; holes and overlapping shells are allowed.
+        Triangles in metres; holes and overlapping shells are allowed. Or the wall that follows
+        some.
     resolution
-        Lattice spacings along the longest side of the bounding box, at least 2. Cells have twice
-        that edge, and a node every spacing.
+        Lattice spacings along the longest side of the bounding box, at least 2. Cells have four
+        times that edge, and nodes a spacing apart.
     components
         ``"error"`` rejects a solid in several pieces, ``"largest"`` keeps the largest.
     grid
-        Lattice of about this resolution around the solid, with an even number of voxels along each
-        axis; `even_grid` if None.
+        Lattice of about this resolution around the solid, see `whole_cells`; `cell_grid` if None.
+    degree
+        Of the cells' shape functions, see `carillon.fem.finite_cells.basis`. Those of degree 2 have
+        twice the spacing for an edge.
 
     Examples
     --------
     >>> from carillon.fem.geometry.builtin import builtin_surface
     >>> cells = finite_cells(builtin_surface("bell"), 12)
-    >>> bool(abs(cells.volume / 8.79e-4 - 1.0) < 0.01), len(cells) > 90
-    (True, True)
+    >>> bool(abs(cells.volume / 8.79e-4 - 1.0) < 0.01), len(cells)
+    (True, 29)
     """
-    return covering(surface, resolution, components, name, grid).cells
+    return covering(surface, resolution, components, name, grid, degree).cells
 
 
-def even_grid(surface: Surface, resolution: int) -> Grid:
-    """The bounding grid, centred, with an even number of voxels along each axis."""
+def cell_grid(surface: Surface | Wall, resolution: int, degree: int = DEGREE) -> Grid:
+    """The bounding grid, centred, with a whole number of cells of this degree along each axis."""
     grid = bounding_grid(surface, resolution)
-    shape = np.array(grid.shape)
-    more = shape % 2
-    even = [int(size) for size in shape + more]
-    return Grid(grid.origin - 0.5 * more * grid.edge, grid.edge, (even[0], even[1], even[2]))
+    more = -np.array(grid.shape) % degree
+    nx, ny, nz = (int(size) for size in np.array(grid.shape) + more)
+    return Grid(grid.origin - 0.5 * more * grid.edge, grid.edge, (nx, ny, nz))
+
+
+def whole_cells(grid: Grid, degree: int = DEGREE) -> Grid:
+    """The lattice with more voxels at its far ends, where these would not be whole cells."""
+    nx, ny, nz = (-(-size // degree) * degree for size in grid.shape)
+    return Grid(grid.origin, grid.edge, (nx, ny, nz))
+
+
+def _require_thick(wall: Wall, resolution: int, grid: Grid, name: str) -> None:
+    """Refuse a wall far thinner than the spacing, whose stiffness would be lost in rounding."""
+    if wall.thickness >= THINNEST * grid.edge:
+        return
+    better = int(np.ceil(resolution * THINNEST * grid.edge / wall.thickness))
+    raise UserError(
+        f"mesh {name!r} at resolution {resolution}: found a wall of {wall.thickness:.3g} m, "
+        f"expected at least {THINNEST:g} of the lattice spacing of {grid.edge:.3g} m; raise the "
+        f"resolution to {better}, or make it thicker"
+    )
 
 
 def _holds(inside: Inside) -> bool:
@@ -121,8 +154,10 @@ def _holds(inside: Inside) -> bool:
     return 0.0 < min(volumes) and max(volumes) <= LOST * min(volumes)
 
 
-def _seen_share(surface: Surface, inside: Inside, grid: Grid) -> float:
+def _seen_share(surface: Surface | Wall, inside: Inside, grid: Grid) -> float:
     """Volume by the lines over that of the surface; 1 unless this is one closed shell."""
+    if isinstance(surface, Wall):
+        return 1.0
     if not surface.is_watertight:  # Triangles may have vertices of their own.
         surface = surface.copy(include_cache=False)
         surface.merge_vertices(merge_tex=True, merge_norm=True)
@@ -132,7 +167,7 @@ def _seen_share(surface: Surface, inside: Inside, grid: Grid) -> float:
     return float((full + 0.5 * sum(inside.volumes())) * grid.edge**3 / abs(surface.volume))
 
 
-def _unseen(surface: Surface, share: float, resolution: int, grid: Grid, name: str) -> str:
+def _unseen(surface: Surface | Wall, share: float, resolution: int, grid: Grid, name: str) -> str:
     better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
     remedy = f"to {better}" if better else "or turn the solid"
     return (
@@ -142,7 +177,7 @@ def _unseen(surface: Surface, share: float, resolution: int, grid: Grid, name: s
     )
 
 
-def _lost(surface: Surface, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
+def _lost(surface: Surface | Wall, inside: Inside, resolution: int, grid: Grid, name: str) -> str:
     start = f"mesh {name!r} at resolution {resolution}"
     nothing = f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
     if inside.sheet:
@@ -157,10 +192,11 @@ def _lost(surface: Surface, inside: Inside, resolution: int, grid: Grid, name: s
     )
 
 
-def _in_pieces(surface: Surface, volumes: np.ndarray, resolution: int, name: str) -> str:
+def _in_pieces(surface: Surface | Wall, volumes: np.ndarray, resolution: int, name: str) -> str:
     listed = ", ".join(f"{volume:,.0f}" for volume in sorted(volumes)[:-5:-1])
     # A piece for each closed shell: these are apart, and no lattice joins them.
-    apart = 1 < surface.body_count <= len(volumes)
+    triangles = surface.surface if isinstance(surface, Wall) else surface
+    apart = 1 < triangles.body_count <= len(volumes)
     better = None if apart else _better_resolution(surface, resolution, _is_one_piece, PIECES_GRID)
     remedy = f"raise the resolution to {better}, where it is one" if better else "join them"
     return (
@@ -170,17 +206,17 @@ def _in_pieces(surface: Surface, volumes: np.ndarray, resolution: int, name: str
 
 
 def _is_one_piece(inside: Inside) -> bool:
-    volumes = pieces(cover_of(inside))[1]
+    volumes = pieces(cover_of(inside, basis()))[1]
     return _holds(inside) and np.count_nonzero(volumes >= SMALLEST_PIECE) == 1
 
 
 def _better_resolution(
-    surface: Surface, resolution: int, accepts: Callable[[Inside], bool], largest: int
+    surface: Surface | Wall, resolution: int, accepts: Callable[[Inside], bool], largest: int
 ) -> int | None:
     """A higher resolution that `accepts` what is inside, on a grid of at most `largest` voxels."""
     for factor in TRIAL_FACTORS:
         better = int(np.ceil(factor * resolution))
-        trial = even_grid(surface, better)
+        trial = cell_grid(surface, better)
         if np.prod([float(size) for size in trial.shape]) > largest:
             return None
         inside = find_inside(surface, trial)

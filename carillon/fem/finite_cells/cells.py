@@ -1,223 +1,226 @@
 """The mesh of finite cells, and its voxels, which carry the material."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
-from carillon.fem.block import CELL_NODES, CORNER_NODES, NODES
-from carillon.fem.finite_cells.hanging import corners_of, kinds_of_cells, node_places
-from carillon.fem.finite_cells.shapes import octant_weights, points
-from carillon.fem.geometry.hexmesh import CORNER_OFFSETS, HexMesh
+from carillon.arrays import Array, Index
+from carillon.fem.finite_cells.basis import DEGREES, Basis, basis, voxel_places
+from carillon.fem.finite_cells.hanging import places_of_kinds
+from carillon.fem.geometry.hexmesh import HexMesh
 
-FLOOR = 1e-9
-"""Share of a cell's stiffness and mass that it has where it is empty, which keeps both matrices
-definite wherever a surface may cut a cell (fictitious material; Duester et al. 2008). A wall of a
-twentieth of the spacing is 2.5 % too stiff with 1e-7 and 0.03 % with 1e-9; with 1e-11 eigensolvers
-lose digits."""
+FLOORS = {2: (1e-9, 1e-9), 4: (1e-10, 1e-14)}
+"""Shares of a cell's stiffness and mass that it has where it is empty, by degree, which keep both
+matrices definite wherever a surface may cut a cell (fictitious material; Duester et al. 2008). Its
+mass is so little that what is empty has no slow motions of its own."""
+
+
+def places_along(degree: int, level: int) -> int:
+    """Voxels along an edge of a cell that is divided `level` times; 1 of one as small as a voxel.
+
+    Quadratic cells keep two: their parts, then halves of a voxel.
+    """
+    return max(degree >> level, 4 // degree)
 
 
 @dataclass(frozen=True, eq=False)
 class FiniteCells:
-    """Cells of twice the lattice's spacing, and what of them is inside.
+    """Cells that cover a solid, what of them is inside, and the voxels that this lies in.
 
-    The 27 nodes of a cell are the corners of its eight octants. Parts of a cell's inside that touch
-    nowhere in it are cells of their own in the same place, with the octants that they lie in.
-
-    Some cells may be divided into eight of half the edge, which the steps of the lattice then are
-    half of; see `carillon.fem.finite_cells.hanging` for their nodes. Each of these lies in one
-    voxel.
+    An undivided cell spans as many voxels along an edge as its `degree`. Cells may be divided into
+    eight of half the edge, several times; see `carillon.fem.finite_cells.hanging` for the nodes of
+    those beside larger ones. Parts of a cell's inside that touch nowhere in it are cells of their
+    own in the same place. Voxels, which carry the material, stay what they are when cells are
+    divided.
     """
 
-    nodes: np.ndarray
-    """(c, 27) int32: nodes of each cell, in the order of `carillon.fem.block.NODES`."""
-    voxels: np.ndarray
-    """(c, 8) int32: voxel of each octant, in bit order; -1 where it is empty."""
-    row: np.ndarray
-    """(c,) int32: row of `weights` of each cell."""
-    weights: np.ndarray
-    """(k, 8, 125) integrals of the points' Lagrange polynomials over the inside of each octant, for
-    a cell of volume one; row 0 is that of a cell all inside."""
+    degree: int
+    """Of the shape functions, see `carillon.fem.finite_cells.basis`."""
+    nodes: NDArray[np.int32]
+    """(c, n) nodes of each cell, in the order of its basis."""
+    corner: NDArray[np.int32]
+    span: NDArray[np.int32]
+    """(c, 3), (c,) lowest corner of each cell and its edge, in steps."""
+    kinds: NDArray[np.int32]
+    """(c,) which nodes are those of larger cells, see `carillon.fem.finite_cells.hanging`."""
+    node_grid: NDArray[np.int32]
+    """(n, 3) places of the nodes in steps, ordered by (z, y, x)."""
+    step: float
+    """Step of the lattice that nodes lie on [m]."""
     mesh: HexMesh
-    """The voxels that hold material, ordered by (z, y, x), and all nodes."""
+    """The voxels that hold material, ordered by (z, y, x), with corners of their own. The lattices
+    of nodes and of voxels have one origin."""
+    cell: NDArray[np.int32]
+    place: NDArray[np.int32]
+    voxel: NDArray[np.int32]
+    row: NDArray[np.int32]
+    """(e,) what cells have of voxels, ordered by cell: the cell; place of the voxel in it, x
+    fastest, 0 of cells no larger than a voxel; the voxel; and the row of `weights`."""
+    weights: Array
+    """(k, d) integrals of the points' Lagrange polynomials over what is inside, for a cell of
+    volume one."""
+    line_weights: Array | None = None
+    """(k, q^3) the same of `Basis.line_points`, which integrate polynomials of higher degree, for
+    estimates of errors; None of cells in files."""
 
     def __len__(self) -> int:
         return len(self.nodes)
 
     @property
-    def grid(self) -> np.ndarray:
-        """Lowest lattice coordinates (c, 3) of the cells."""
-        return np.asarray(self.mesh.node_grid[self.nodes[:, 0]])
+    def basis(self) -> Basis:
+        """Shape functions of the cells."""
+        return basis(self.degree)
 
     @property
-    def span(self) -> np.ndarray:
-        """Edge (c,) of each cell in steps of the lattice: 2, or 4 beside divided ones."""
-        return np.asarray(self.mesh.node_grid[self.nodes[:, -1], 0] - self.grid[:, 0])
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.node_grid)
 
     @property
-    def is_mixed(self) -> bool:
-        """Whether there are cells of two sizes."""
-        return self.mesh.span is not None
+    def origin(self) -> Array:
+        """(3,) corner of the lattices [m]."""
+        return np.asarray(self.mesh.origin)
 
     @cached_property
-    def kinds(self) -> np.ndarray | None:
-        """Kinds (c,) of the cells, see `carillon.fem.finite_cells.hanging`; None if of one size."""
-        if not self.is_mixed:
-            return None
-        places = self._places()
-        own = NODES * (self.span // 2)[:, None, None]
-        octants = (self.grid // self.span[:, None] % 2) @ np.array([1, 2, 4])
-        return kinds_of_cells(octants, (places != own).any(axis=2))
-
-    def _places(self) -> np.ndarray:
-        return np.asarray(self.mesh.node_grid[self.nodes] - self.grid[:, None])
+    def positions(self) -> Array:
+        """Positions (n, 3) of the nodes [m]."""
+        return self.origin + self.step * self.node_grid
 
     @property
-    def is_whole(self) -> np.ndarray:
-        """Which cells (c,) are all inside."""
-        return np.asarray(self.row == 0)
+    def edges(self) -> Array:
+        """Edge (c,) of each cell [m]."""
+        return np.asarray(self.step * self.span)
+
+    @cached_property
+    def levels(self) -> Index:
+        """How many times (c,) each cell is divided."""
+        return np.rint(np.log2(self._ratios)).astype(np.int64)
 
     @property
-    def fractions(self) -> np.ndarray:
-        """Share (c, 8) of each octant's volume that is inside."""
-        return np.asarray(8.0 * self.weights.sum(axis=2)[self.row])
+    def _ratios(self) -> Array:
+        """Edge (c,) of an undivided cell over that of each."""
+        return np.asarray(self.degree * self.mesh.edge / self.edges)
 
-    def voxel_shares(self) -> np.ndarray:
+    @cached_property
+    def counts(self) -> Index:
+        """Voxels (c,) along an edge of each cell, see `places_along`."""
+        return np.array([places_along(self.degree, int(level)) for level in self.levels])
+
+    def frames(self) -> tuple[Array, Array]:
+        """Lowest corners (e, 3) and edges (e,), in cells, of the voxels that portions are of."""
+        counts = self.counts[self.cell]
+        low = np.empty((len(self.cell), 3))
+        for count in np.unique(counts):
+            chosen = counts == count
+            low[chosen] = voxel_places(int(count))[self.place[chosen]] / count
+        return low, 1.0 / counts
+
+    @cached_property
+    def shares(self) -> Array:
+        """Share (e,) of the cell that each part of a voxel is."""
+        return np.asarray(self.weights.sum(axis=1)[self.row])
+
+    @cached_property
+    def fractions(self) -> Array:
+        """Share (c,) of each cell that is inside."""
+        return np.asarray(np.bincount(self.cell, self.shares, minlength=len(self)), dtype=float)
+
+    def voxel_shares(self) -> Array:
         """Share (m,) of each voxel's volume that is inside."""
-        shares = np.empty(self.mesh.n_cells)
-        there = self.voxels >= 0
-        shares[self.voxels[there]] = self.fractions[there]
-        return shares
+        volumes = self.shares * self.edges[self.cell] ** 3
+        inside = np.bincount(self.voxel, volumes, minlength=self.mesh.n_cells)
+        return np.asarray(inside / self.mesh.edge**3)
 
     @property
     def volume(self) -> float:
         """Volume inside [m^3]."""
-        octants = (self.span / 2.0 * self.mesh.edge) ** 3
-        return float((self.fractions.sum(axis=1) * octants).sum())
+        return float((self.fractions * self.edges**3).sum())
+
+    @cached_property
+    def neighbours(self) -> Index:
+        """Pairs (p, 2) of cells that share a face, or a part of one."""
+        middles = self.nodes[:, self.basis.middles]
+        found = [np.empty((0, 2), dtype=np.int64)]
+        for axis in range(3):
+            upper, lower = middles[:, 2 * axis + 1], middles[:, 2 * axis]
+            order = np.argsort(lower, kind="stable")
+            first, last = (np.searchsorted(lower[order], upper, side=s) for s in ("left", "right"))
+            above = np.repeat(np.arange(len(self)), last - first)
+            start = np.repeat(first - np.cumsum(last - first) + (last - first), last - first)
+            below = order[start + np.arange(len(above))]
+            found.append(np.stack([above, below], axis=1))
+        return np.concatenate(found)
+
+    def point_values(self, values: Array, floor: float) -> Array:
+        """Weighted values (c, d) at the points of cells, from those (m,) of the voxels.
+
+        A cell has, all over, a share `floor` of the mean over what is inside.
+        """
+        given = values[self.voxel]
+        shape = (len(self), len(self.weights))
+        matrix = sp.csr_matrix(
+            (given, self.row, np.searchsorted(self.cell, range(len(self) + 1))), shape
+        )
+        mean = np.bincount(self.cell, given * self.shares, minlength=len(self)) / self.fractions
+        return np.asarray(matrix @ self.weights) + (floor * mean)[:, None] * self.basis.whole
 
     def is_consistent(self) -> bool:
-        """Whether nodes lie at their places, voxels in their octants, and each is of some cell."""
-        mesh, span = self.mesh, self.span
-        cell, octant = np.nonzero(self.voxels >= 0)
-        voxel = self.voxels[cell, octant]
-        if not np.array_equal(np.unique(voxel), np.arange(mesh.n_cells)):
+        """Whether nodes lie at their places, and cells, nodes and voxels have one another."""
+        if self.degree not in DEGREES or not len(self):
             return False
-        if not np.array_equal(np.unique(self.nodes), np.arange(mesh.n_nodes)):
+        if not np.array_equal(np.unique(self.nodes), np.arange(self.n_nodes)):
             return False
-        if not np.isin(span, (2, 4) if self.is_mixed else (2,)).all():
+        if self.voxel.min(initial=0) < 0 or self.voxel.max(initial=-1) >= self.mesh.n_cells:
             return False
-        if (self.grid % span[:, None]).any():
+        if not np.array_equal(np.unique(self.cell), np.arange(len(self))):
             return False
-        places = NODES if self.kinds is None else node_places(self.kinds)
-        if not np.array_equal(self._places(), places * (span // 2)[:, None, None]):
+        if (np.diff(self.cell) < 0).any() or (self.row < 0).any():
             return False
-        corners, grid = _voxels_of(self.nodes, self.grid, self.span, self.is_mixed)
-        return (
-            np.array_equal(mesh.cells[voxel], corners[cell, octant])
-            and np.array_equal(mesh.grid[voxel], grid[cell, octant])
-            and bool((self.fractions[self.voxels >= 0] > 0.0).all())
-        )
-
-    def hexmesh(self) -> HexMesh:
-        """The cells as cubes with nodes at their corners, by which neighbours are found."""
-        mesh, corners = self.mesh, self.nodes[:, CORNER_NODES]
-        if self.kinds is None:
-            return HexMesh(corners, self.grid // 2, mesh.node_grid, mesh.origin, 2 * mesh.edge)
-        corners, hanging = corners_of(self.kinds, self.nodes)
-        span = (self.span // 2).astype(np.uint8)
-        grid = (self.grid // 2).astype(np.int32)
-        return HexMesh(corners, grid, mesh.node_grid, mesh.origin, 2 * mesh.edge, span, hanging)
-
-    def point_values(self, values: np.ndarray) -> np.ndarray:
-        """Weighted values (c, 125) at the points of cells, from those (m,) of the voxels.
-
-        A part of a cell that is empty has `FLOOR` of the mean over what is not.
-        """
-        of_octants = np.where(self.voxels >= 0, values[self.voxels], 0.0)
-        whole = octant_weights().sum(axis=0)
-        inside = self.weights[self.row]
-        weighted = np.einsum("co,cop->cp", of_octants, inside)
-        share = 8.0 * inside.sum(axis=2)
-        mean = (of_octants * share).sum(axis=1) / share.sum(axis=1)
-        return np.asarray(weighted + FLOOR * mean[:, None] * whole)
+        if (self.row >= len(self.weights)).any() or (self.span <= 0).any():
+            return False
+        if (self.span % self.degree).any() or (self.corner % self.span[:, None]).any():
+            return False
+        if np.abs(self._ratios / 2.0**self.levels - 1.0).max() > 1e-9 or self.levels.min() < 0:
+            return False
+        if (self.place < 0).any() or (self.place >= self.counts[self.cell] ** 3).any():
+            return False
+        scale = (self.span // self.degree)[:, None, None]
+        places = self.corner[:, None] + scale * places_of_kinds(self.degree, self.kinds)
+        return np.array_equal(self.node_grid[self.nodes], places) and bool((self.shares > 0).all())
 
 
-def assemble_cells(
-    nodes: np.ndarray,
-    node_grid: np.ndarray,
-    row: np.ndarray,
-    weights: np.ndarray,
-    origin: np.ndarray,
-    edge: float,
-    is_mixed: bool = False,
-) -> FiniteCells:
-    """Finite cells with the voxels that follow from their weights."""
-    grid = node_grid[nodes[:, 0]]
-    span = node_grid[nodes[:, -1], 0] - grid[:, 0]
-    corners, places = _voxels_of(nodes, grid, span, is_mixed)
-    filled = (weights.sum(axis=2) > 0.0)[row]
-    cell, octant = np.nonzero(filled)
-    in_one = (span == 2) & is_mixed
-    # One voxel for all octants of a cell that lies in it.
-    first = filled.argmax(axis=1)
-    own = np.where(in_one[cell], first[cell], octant)
-    leads = np.flatnonzero(octant == own)
-    order = leads[np.lexsort((cell[leads], *places[cell[leads], octant[leads]].T))]
-    voxels = np.full(filled.shape, -1, dtype=np.int32)
-    voxels[cell[order], octant[order]] = np.arange(len(order))
-    voxels[cell, octant] = voxels[cell, own]
-    sizes: tuple[np.ndarray, ...] = ()
-    if is_mixed:
-        sizes = np.full(len(order), 2, np.uint8), np.zeros(len(order), np.uint8)
-    mesh = HexMesh(
-        corners[cell[order], octant[order]].astype(np.int32),
-        places[cell[order], octant[order]].astype(np.int32),
-        node_grid.astype(np.int32),
-        origin,
-        edge,
-        *sizes,
-    )
-    return FiniteCells(nodes.astype(np.int32), voxels, row.astype(np.int32), weights, mesh)
-
-
-def _voxels_of(
-    nodes: np.ndarray, grid: np.ndarray, span: np.ndarray, is_mixed: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (c, 8, 8) and lattice coordinates (c, 8, 3) of the voxels of the cells' octants."""
-    in_one = (is_mixed & (span == 2))[:, None, None]
-    corners = np.where(in_one, nodes[:, None, CORNER_NODES], nodes[:, CELL_NODES])
-    offsets = CORNER_OFFSETS * (span // 2)[:, None, None]
-    return corners, grid[:, None] + np.where(in_one, 0, offsets)
-
-
-def centroids(cells: FiniteCells) -> tuple[Array, Array]:
+def middles_of_voxels(cells: FiniteCells) -> tuple[Array, Array]:
     """Middles (m, 3) [m] of what is inside each voxel, and its covariances (m, 3, 3) [m^2]."""
-    cell, octant = np.nonzero(cells.voxels >= 0)
-    order = np.argsort(cells.voxels[cell, octant], kind="stable")
-    cell, octant = cell[order], octant[order]
-    weights = cells.weights[cells.row[cell], octant]
-    scale = cells.span[cell].astype(float)
-    volume = weights.sum(axis=1)
-    middles = scale[:, None] * (weights @ points() / volume[:, None])
-    squares = (points()[:, :, None] * points()[:, None, :]).reshape(len(points()), -1)
-    second = (scale**2 / volume)[:, None] * (weights @ squares)
-    covariance = second.reshape(-1, 3, 3) - middles[:, :, None] * middles[:, None, :]
-    middles = cells.grid[cell] + middles
-    if cells.is_mixed:
-        # A divided cell lies in one voxel, with all of its octants.
-        voxel = cells.voxels[cell, octant]
-        first = np.flatnonzero(np.diff(voxel, prepend=-1))
-        share = volume * scale**3
-        total = np.add.reduceat(share, first)
-        joined = np.add.reduceat(share[:, None] * middles, first) / total[:, None]
-        apart = middles - joined[voxel]
-        covariance += apart[:, :, None] * apart[:, None, :]
-        summed = np.add.reduceat(share[:, None, None] * covariance, first)
-        middles, covariance = joined, summed / total[:, None, None]
-    edge = cells.mesh.edge
-    return cells.mesh.origin + edge * middles, edge**2 * covariance
+    points = cells.basis.points
+    edge = cells.edges[cells.cell]
+    local = (cells.weights @ points)[cells.row] / cells.shares[:, None]
+    squares = (points[:, :, None] * points[:, None, :]).reshape(len(points), -1)
+    second = ((cells.weights @ squares)[cells.row] / cells.shares[:, None]).reshape(-1, 3, 3)
+    spread = second - local[:, :, None] * local[:, None, :]
+    middle = cells.origin + cells.step * cells.corner[cells.cell] + edge[:, None] * local
+    spread = (edge**2)[:, None, None] * spread
+    volume = cells.shares * edge**3
+    count = cells.mesh.n_cells
+    total = np.bincount(cells.voxel, volume, minlength=count)
+    empty = total == 0.0  # slivers that finer lines miss
+    total[empty] = 1.0
+    joined = _sums(cells.voxel, volume[:, None] * middle, count) / total[:, None]
+    joined[empty] = cells.origin + cells.mesh.edge * (cells.mesh.grid[empty] + 0.5)
+    apart = middle - joined[cells.voxel]
+    spread += apart[:, :, None] * apart[:, None, :]
+    summed = _sums(cells.voxel, (volume[:, None, None] * spread).reshape(-1, 9), count)
+    return joined, (summed / total[:, None]).reshape(-1, 3, 3)
+
+
+def _sums(group: NDArray[np.integer], values: Array, count: int) -> Array:
+    """Sums (count, k) of values (e, k) by group (e,)."""
+    columns = [np.bincount(group, column, minlength=count) for column in values.T]
+    return np.stack(columns, axis=1)
 
 
 def surface_points(cells: FiniteCells, voxels: NDArray[np.integer], outward: Array) -> Array:
@@ -229,7 +232,7 @@ def surface_points(cells: FiniteCells, voxels: NDArray[np.integer], outward: Arr
     Examples
     --------
     >>> from carillon.fem.finite_cells.build import finite_cells
-    >>> from carillon.fem.geometry import builtin_surface
+    >>> from carillon.fem.geometry.builtin import builtin_surface
     >>> surface = builtin_surface("box")
     >>> cells = finite_cells(surface, 5)
     >>> top = cells.mesh.n_cells - 1
@@ -237,7 +240,31 @@ def surface_points(cells: FiniteCells, voxels: NDArray[np.integer], outward: Arr
     >>> bool(abs(place[0, 2] - surface.bounds[1, 2]) < 1e-9)
     True
     """
-    middles, covariance = centroids(cells)
+    middles, covariance = middles_of_voxels(cells)
     variance = np.einsum("si,sij,sj->s", outward, covariance[voxels], outward)
     reach = np.sqrt(3.0 * np.maximum(variance, 0.0))
     return np.asarray(middles[voxels] + reach[:, None] * outward)
+
+
+def merged(cells: FiniteCells) -> FiniteCells:
+    """The same cells, of which those with the same nodes are one."""
+    same, first, number = np.unique(cells.nodes, axis=0, return_index=True, return_inverse=True)
+    if len(same) == len(cells):
+        return cells
+    # In the order of the first ones.
+    order = np.argsort(first)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    kept, cell = first[order], rank[number.ravel()][cells.cell]
+    by_cell = np.argsort(cell, kind="stable")
+    return replace(
+        cells,
+        nodes=cells.nodes[kept],
+        corner=cells.corner[kept],
+        span=cells.span[kept],
+        kinds=cells.kinds[kept],
+        cell=cell[by_cell].astype(np.int32),
+        place=cells.place[by_cell],
+        voxel=cells.voxel[by_cell],
+        row=cells.row[by_cell],
+    )

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
-from carillon.fem.block import NODES
 from carillon.fem.elements import Chosen, Elements
-from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.hanging import at_nodes, node_places, node_weights
+from carillon.fem.finite_cells.basis import basis
+from carillon.fem.finite_cells.cells import FLOORS, FiniteCells
+from carillon.fem.finite_cells.hanging import at_nodes, from_own, places_of_kinds
 from carillon.fem.finite_cells.kinks import Kinks
-from carillon.fem.finite_cells.shapes import point_mass, point_stiffness, shape_functions
+from carillon.fem.finite_cells.matrices import nodal_mass, stiffness
 from carillon.fem.finite_cells.shared_cells import (
     SharedCells,
     kinks_of,
@@ -22,6 +22,7 @@ from carillon.fem.finite_cells.shared_cells import (
     side_moduli,
 )
 from carillon.fem.geometry import HexMesh
+from carillon.fem.laplacian import CellGraph
 from carillon.fem.model import Solid
 from carillon.fem.moduli import require_moduli
 from carillon.fem.regions import RegionOf, Regions
@@ -30,23 +31,25 @@ from carillon.fem.supports import Attached, Supports
 
 @dataclass(frozen=True)
 class CellElements(Elements):
-    """Quadratic cells of twice the lattice's spacing, integrated over what of them is inside."""
+    """Finite cells, integrated over what of them is inside."""
 
-    ROWS = ("young", "shares", "law", "span", "kinds", "kink", "support")
+    ROWS = ("young", "shares", "span", "kinds", "law", "kink", "support")
 
     young: Array
-    """(c, s, 125) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.shapes`, of
+    """(c, s, d) moduli [Pa] times the points' weights, see `carillon.fem.finite_cells.basis`, of
     what the cell holds of each of its regions."""
     shares: Array
-    """(c, s, 125) the points' weights of what the cell holds of each of its regions."""
+    """(c, s, d) the points' weights of what the cell holds of each of its regions."""
+    span: NDArray[np.int32]
+    """(c,) edges in steps of the lattice."""
+    kinds: NDArray[np.int32]
+    """(c,) see `FiniteCells`."""
     edge: float
     """Step of the lattice [m]."""
     regions: Regions
+    degree: int
     law: RegionOf | None = None
     """(c, s) regions of each cell; None if there is one, and s is 1."""
-    span: NDArray[np.int32] | None = None
-    kinds: Index | None = None
-    """(c,) see `FiniteCells`, of cells of two sizes; else None."""
     kink: NDArray[np.int32] | None = None
     """(c,) numbers of the cells in `kinks`, -1 of those without."""
     kinks: Kinks | None = None
@@ -55,41 +58,34 @@ class CellElements(Elements):
     attached: Attached | None = None
 
     @property
-    def steps(self) -> int:
-        return 2 if self.span is None else 4
+    def steps(self) -> None:
+        return None
 
     @property
     def node_places(self) -> Index:
-        if self.span is None or self.kinds is None:
-            return np.broadcast_to(NODES, (len(self), *NODES.shape))
-        return node_places(self.kinds) * (self.span // 2)[:, None, None]
+        scale = (self.span // self.degree)[:, None, None]
+        return places_of_kinds(self.degree, self.kinds) * scale
 
-    def edges(self, chosen: Chosen) -> Array | float:
-        """Edges [m] of the chosen cells, (c, 1) of cells of two sizes."""
-        if self.span is None:
-            return 2.0 * self.edge
+    def edges(self, chosen: Chosen) -> Array:
+        """Edges (c, 1) [m] of the chosen cells."""
         return self.edge * self.span[chosen][:, None].astype(float)
-
-    def _between_nodes(self, matrices: Array, chosen: Chosen) -> Array:
-        return matrices if self.kinds is None else at_nodes(matrices, self.kinds[chosen])
-
-    @property
-    def collinear(self) -> Flags:
-        return np.ones(len(self), dtype=bool)  # there are three nodes on an edge
 
     @property
     def sort_key(self) -> Index:
-        # None is needed: parts in one place have a node of their own in their middle.
+        # None is needed: no two cells have the same nodes.
         return np.zeros(len(self), dtype=np.int64)
 
     def shape_values(self, elements: NDArray[np.integer], places: Array) -> Array:
-        values = shape_functions(places)
-        if self.kinds is None:
-            return values
-        return np.asarray(values[:, None] @ node_weights(self.kinds[elements]))[:, 0]
+        shape = basis(self.degree)
+        inside = np.clip(places, 0.0, 1.0)
+        # Beside a cell displacements go on as straight lines.
+        slopes = np.einsum("pna,pa->pn", shape.gradients(inside), places - inside)
+        values = (shape.functions(inside) + slopes)[:, :, None]
+        kinds = self.kinds[elements]
+        return np.asarray(from_own(self.degree, values, kinds)[:, :, 0])
 
     def by_law(self, chosen: Chosen) -> list[tuple[int, Index | slice, Array]]:
-        """Regions, the chosen cells that hold some of each, and moduli (r, 125) there."""
+        """Regions, the chosen cells that hold some of each, and moduli (r, d) there."""
         young = self.young[chosen]
         if self.law is None:
             return [(0, slice(None), young[:, 0])]
@@ -105,17 +101,21 @@ class CellElements(Elements):
         return np.asarray(np.where(there, self.young, 0.0))
 
     def free_stiffness(self, chosen: Chosen = slice(None)) -> Array:
-        edges = self.edges(chosen)
-        parts = self.by_law(chosen)
+        return at_nodes(self.degree, self.own_stiffness(chosen), self.kinds[chosen])
+
+    def own_stiffness(self, chosen: Chosen = slice(None)) -> Array:
+        """Stiffness (c, 3 n, 3 n) [N/m] between the places in the cells that nodes have if none is
+        that of a larger cell."""
+        edges, parts = self.edges(chosen), self.by_law(chosen)
         if self.law is None:
-            matrices = (edges * parts[0][2]) @ point_stiffness(self.regions.laws[0])
-        else:
-            matrices = np.zeros((len(self.young[chosen]), 81 * 81))
-            for number, cells, moduli in parts:
-                matrices[cells] += moduli @ point_stiffness(self.regions.laws[number])
-            self._add_kinks(chosen, matrices.reshape(-1, 81, 81))
-            matrices *= edges
-        return self._between_nodes(matrices.reshape(-1, 81, 81), chosen)
+            return stiffness(self.degree, self.regions.elasticity[0], edges * parts[0][2])
+        size = 3 * basis(self.degree).n_nodes
+        matrices = np.zeros((len(edges), size, size))
+        for number, cells, moduli in parts:
+            matrices[cells] += stiffness(self.degree, self.regions.elasticity[number], moduli)
+        self._add_kinks(chosen, matrices)
+        matrices *= edges[:, :, None]
+        return matrices
 
     def with_regions(self, regions: Regions) -> Self:
         # How kinks follow the nodes stays as it is.
@@ -136,7 +136,7 @@ class CellElements(Elements):
 
     @cached_property
     def share(self) -> Array:
-        """(c, 125) weighted densities at the points, over that of the first region."""
+        """(c, d) weighted densities at the points, over that of the first region."""
         return self._share(slice(None))
 
     def _share(self, chosen: Chosen) -> Array:
@@ -146,10 +146,13 @@ class CellElements(Elements):
         ratios = (self.regions.density / self.regions.density[0])[self.law[chosen]]
         return np.einsum("cs,csp->cp", ratios, shares)
 
-    def _nodal_mass(self, chosen: Chosen) -> Array:
+    def own_mass(self, chosen: Chosen = slice(None)) -> Array:
+        """Mass (c, n, n) [kg] between the places of `own_stiffness`."""
         scale = float(self.regions.density[0]) * self.edges(chosen) ** 3
-        matrices = (scale * self._share(chosen)) @ point_mass()
-        return self._between_nodes(matrices.reshape(-1, 27, 27), chosen)
+        return nodal_mass(self.degree, scale * self._share(chosen))
+
+    def _nodal_mass(self, chosen: Chosen) -> Array:
+        return at_nodes(self.degree, self.own_mass(chosen), self.kinds[chosen])
 
 
 @dataclass(frozen=True)
@@ -172,22 +175,29 @@ class FiniteCellModel(Solid):
     def mesh(self) -> HexMesh:  # type: ignore[override]
         return self.cells.mesh
 
+    @property
+    def positions(self) -> Array:
+        return self.cells.positions
+
+    @property
+    def node_grid(self) -> NDArray[np.int32]:
+        return self.cells.node_grid
+
     @cached_property
     def elements(self) -> CellElements:
         # Made once, since the weights of all cells go into them.
         young, law = self._point_moduli(self.young)
-        shares = self._shares()
-        span = self.cells.span if self.cells.is_mixed else None
         support, attached = self.attached()
         kink, kinks = self._kinks()
         return CellElements(
             young,
-            shares,
-            self.mesh.edge,
-            self.regions,
-            law,
-            span,
+            self._shares(),
+            self.cells.span,
             self.cells.kinds,
+            self.cells.step,
+            self.regions,
+            self.cells.degree,
+            law,
             kink,
             kinks,
             support,
@@ -204,18 +214,22 @@ class FiniteCellModel(Solid):
         kink[kinks.borders.cell] = np.arange(len(kinks.borders))
         return kink, kinks
 
+    @property
+    def _floors(self) -> tuple[float, float]:
+        return FLOORS[self.cells.degree]
+
     def linear_moduli(self, along: Array) -> Array:
-        """Moduli (c, s, 125) at the points of cells, of voxels' (m,) that may be negative."""
+        """Moduli (c, s, d) at the points of cells, of voxels' (m,) that may be negative."""
         return self._point_moduli(along)[0]
 
     def _point_moduli(self, young: Array) -> tuple[Array, RegionOf | None]:
         if self.region is None:
-            return self.cells.point_values(young)[:, None], None
+            return self.cells.point_values(young, self._floors[0])[:, None], None
         return point_moduli(self.cells, self.regions, self.region, self.shared, young)
 
     def _shares(self) -> Array:
         if self.region is None:
-            return self.cells.point_values(np.ones(self.mesh.n_cells))[:, None]
+            return self.cells.point_values(np.ones(self.mesh.n_cells), self._floors[1])[:, None]
         return point_shares(self.cells, self.region, self.shared)
 
     @property
@@ -223,12 +237,26 @@ class FiniteCellModel(Solid):
         return np.asarray(self.cells.nodes)
 
     @property
-    def hexmesh(self) -> HexMesh:
-        return self.cells.hexmesh()
+    def graph(self) -> CellGraph:
+        cells = self.cells
+        return CellGraph((cells.corner // cells.span.min()).astype(np.int64), cells.neighbours)
 
     @property
-    def filled(self) -> Flags:
-        return np.asarray(self.cells.voxels >= 0)
+    def boxes(self) -> tuple[Array, Array]:
+        cells = self.cells
+        return cells.origin + cells.step * cells.corner, cells.edges
+
+    def far_from_material(self, elements: Index, points: Array) -> Array:
+        cells = self.cells
+        low, edge = cells.frames()
+        corners, edges = self.boxes
+        middle = corners[cells.cell] + edges[cells.cell, None] * (low + edge[:, None] / 2.0)
+        first, last = (np.searchsorted(cells.cell, elements, side=s) for s in ("left", "right"))
+        result = np.full(elements.shape, np.inf)
+        for place in np.ndindex(*elements.shape):
+            some = middle[first[place] : last[place]]
+            result[place] = np.linalg.norm(some - points[place[0]], axis=1).min()
+        return result
 
     def element_moduli(self, young: Array) -> Array:
         given = require_moduli(young, self.mesh.n_cells, points=False)
@@ -241,8 +269,7 @@ class FiniteCellModel(Solid):
     def mass(self) -> float:
         if self.region is None:
             return float(self.regions.density[0]) * self.cells.volume
-        edges = self.cells.span * self.mesh.edge
-        volumes = self.elements.share.sum(axis=1) * edges**3
+        volumes = self.elements.share.sum(axis=1) * self.cells.edges**3
         return float(self.regions.density[0] * volumes.sum())
 
     @property
@@ -271,7 +298,7 @@ def finite_cell_model(
     >>> cells = finite_cells(builtin_surface("box"), 8)
     >>> model = finite_cell_model(cells, np.full(cells.mesh.n_cells, 1e9))
     >>> model.n_dofs, round(model.mass, 9)
-    (945, 3.0)
+    (411, 3.0)
     """
     given = require_moduli(young, cells.mesh.n_cells, points=False)
     regions = Regions.one() if regions is None else regions

@@ -14,7 +14,6 @@ from carillon.fem.finite_cells.lines import (
     CUT,
     EMPTY,
     FULL,
-    LINES,
     SKIPPED,
     Crossings,
     Lines,
@@ -75,7 +74,7 @@ def pieces_of_open_surface(
     axes = (lines.axis + 1) % 3, (lines.axis + 2) % 3, lines.axis
     turned = [np.ascontiguousarray(each.transpose(axes)) for each in (state, levels)]
     low, high, line, inside, unsure = _in_voxels(
-        lines.start, lines.place, lines.step, lines.columns, turned[0], turned[1], ends, LINES
+        lines.start, lines.place, lines.step, lines.columns, turned[0], turned[1], ends, lines.lines
     )
     asked = np.flatnonzero(unsure)
     if len(asked):

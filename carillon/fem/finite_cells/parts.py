@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
-from carillon.fem.element import CORNERS
-from carillon.fem.finite_cells.lines import CUT, FULL, LINES, Pieces
+from carillon.fem.finite_cells.basis import voxel_places
+from carillon.fem.finite_cells.lines import CUT, FULL, Pieces
 
 Labels = NDArray[np.int16]
 
+BOXES = 8
+"""Boxes along each edge of a voxel, each for some lines."""
 SLIVER = 1e-4
 """Length [voxels] of a line's piece in a voxel below which it is taken to miss it."""
-BOXES = 2 * LINES
-"""Boxes along each edge of a cell."""
 
 
 def find_parts(
-    cells: Index, state: NDArray[np.int8], pieces: tuple[Pieces, ...]
+    cells: Index, count: int, state: NDArray[np.int8], pieces: tuple[Pieces, ...]
 ) -> tuple[Labels, Index]:
     """Number the parts of each cell.
 
@@ -30,26 +30,28 @@ def find_parts(
     ----------
     cells : (k, 3)
         Lowest voxels of the cells.
-    state : (k, 8)
-        States of their octants, see `carillon.fem.finite_cells.lines`.
+    count
+        Voxels along an edge of a cell.
+    state : (k, count^3)
+        States of their voxels, x fastest, see `carillon.fem.finite_cells.lines`.
     pieces
         Of the lines along x, y and z.
 
     Returns
     -------
-    labels : (k, BOXES, BOXES, BOXES)
-        Part of each box, numbered from 1 in each cell; 0 outside.
+    labels : (k, b, b, b)
+        Part of each of the ``b = count * BOXES`` boxes along an edge, numbered from 1 in each cell;
+        0 outside.
     counts : (k,)
         Number of parts.
     """
-    labels = np.zeros((len(cells), BOXES, BOXES, BOXES), dtype=np.int16)
+    labels = np.zeros((len(cells), *(count * BOXES,) * 3), dtype=np.int16)
     for each, bounds in zip(pieces, box_bounds(pieces)):
-        _take_along(
-            cells, state, each.axis, each.start, each.low, each.high, each.columns, bounds, labels
-        )
-    for octant, corner in enumerate(LINES * CORNERS):
-        x, y, z = (slice(start, start + LINES) for start in corner)
-        labels[state[:, octant] == FULL, x, y, z] = -1
+        of_cells = cells, count, state, each.axis, each.lines
+        _take_along(*of_cells, each.start, each.low, each.high, each.columns, bounds, labels)
+    for voxel, corner in enumerate(BOXES * voxel_places(count)):
+        x, y, z = (slice(start, start + BOXES) for start in corner)
+        labels[state[:, voxel] == FULL, x, y, z] = -1
     counts = np.zeros(len(cells), dtype=np.int64)
     _number(labels, counts)
     return labels, counts
@@ -77,48 +79,52 @@ def meetings_of_halves(
     quarter : (p, 2)
         Half of the whole cell's face along each of the other axes that the smaller cell lies at.
     side
-        Of the smaller cell that the face is on: 0, or 2 for the upper one.
+        Of the smaller cell that the face is on: 0, or 1 for the upper one.
     """
     found = _meetings_of_halves(whole, half, quarter, *labels, axis, side)
     return np.array(found, dtype=np.int64).reshape(-1, 3)
 
 
 def box_bounds(pieces: tuple[Pieces, ...]) -> list[Array]:
-    """Bounds (n, LINES - 1) of the boxes in each voxel along x, y and z."""
+    """Bounds (n, BOXES - 1) of the boxes in each voxel along x, y and z."""
     x, y, z = pieces
-    return [z.across[0].bounds, x.across[0].bounds, y.across[0].bounds]
+    every = x.lines // BOXES
+    spreads = z.across[0], x.across[0], y.across[0]
+    return [np.ascontiguousarray(spread.bounds[:, every - 1 :: every]) for spread in spreads]
 
 
 @numba.njit(cache=True, nogil=True)
 def _take_along(  # type: ignore[no-untyped-def]
-    cells, state, axis, start, low, high, columns, bounds, labels
+    cells, count, state, axis, n, start, low, high, columns, bounds, labels
 ):
-    n = bounds.shape[1] + 1
+    boxes = BOXES
     b, c = (axis + 1) % 3, (axis + 2) % 3
-    at = np.empty(3, dtype=np.int64)
+    at, own = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for k in range(len(cells)):
-        for octant in range(8):
-            if state[k, octant] != CUT:
+        for number_in in range(count**3):
+            if state[k, number_in] != CUT:
                 continue
-            half_a, half_b, half_c = octant >> axis & 1, octant >> b & 1, octant >> c & 1
-            voxel = cells[k, axis] + half_a
+            own[0], own[1] = number_in % count, number_in // count % count
+            own[2] = number_in // count**2
+            voxel = cells[k, axis] + own[axis]
             for i in range(n):
                 for j in range(n):
-                    row, column = (cells[k, b] + half_b) * n + i, (cells[k, c] + half_c) * n + j
+                    row, column = (cells[k, b] + own[b]) * n + i, (cells[k, c] + own[c]) * n + j
                     line = row * columns + column
-                    at[b], at[c] = half_b * n + i, half_c * n + j
+                    at[b] = own[b] * boxes + i * boxes // n
+                    at[c] = own[c] * boxes + j * boxes // n
                     for number in range(start[line], start[line + 1]):
                         begin = max(low[number] - voxel, 0.0)
                         end = min(high[number] - voxel, 1.0)
                         if end - begin < SLIVER:
                             continue
                         first, last = 0, 0
-                        while first < n - 1 and bounds[voxel, first] <= begin:
+                        while first < boxes - 1 and bounds[voxel, first] <= begin:
                             first += 1
-                        while last < n - 1 and bounds[voxel, last] < end:
+                        while last < boxes - 1 and bounds[voxel, last] < end:
                             last += 1
                         for box in range(first, last + 1):
-                            at[axis] = half_a * n + box
+                            at[axis] = own[axis] * boxes + box
                             labels[k, at[0], at[1], at[2]] = -1
 
 
@@ -167,18 +173,18 @@ def _meetings(lower, upper, labels, axis):  # type: ignore[no-untyped-def]
 def _meetings_of_halves(  # type: ignore[no-untyped-def]
     whole, half, quarter, whole_labels, half_labels, axis, side
 ):
-    size = whole_labels.shape[1]
+    larger, size = whole_labels.shape[1], half_labels.shape[1]
     found = [(0, 0, 0)][:0]
-    face = np.empty((size, size), dtype=np.int64)
+    face = np.empty((larger, larger), dtype=np.int64)
     one = np.empty((size, size), dtype=np.int64)
     other = np.empty((size, size), dtype=np.int64)
     for pair in range(len(whole)):
-        _face(whole_labels, whole[pair], axis, 0 if side else size - 1, face)
+        _face(whole_labels, whole[pair], axis, 0 if side else larger - 1, face)
         _face(half_labels, half[pair], axis, size - 1 if side else 0, other)
         for i in range(size):
             for j in range(size):
                 row, column = quarter[pair, 0] * size + i, quarter[pair, 1] * size + j
-                one[i, j] = face[row // 2, column // 2]
+                one[i, j] = face[row * larger // (2 * size), column * larger // (2 * size)]
         _meet(pair, one, other, found)
     return found
 

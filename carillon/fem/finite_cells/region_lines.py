@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
-from carillon.fem.element import CORNERS
+from carillon.fem.finite_cells.basis import Basis, lagrange
 from carillon.fem.finite_cells.cells import FiniteCells
-from carillon.fem.finite_cells.shapes import OCTANTS, POINT_PLACES, POINTS, lagrange
 
 RegionsAt = Callable[[Array], NDArray[np.integer]]
 """Region (p,) of points (p, 3) [m]; -1 where there is none."""
@@ -28,38 +28,45 @@ GROUPS, GROUPS_CUT = 2, 1
 voxels that the surface cuts, whose weights are known together."""
 AT_ONCE = 500_000
 """Points whose regions are found at once."""
+PIECES_AT_ONCE = 8192
+"""Pieces of lines that are integrated at once: 48 MB."""
 
 
 @dataclass(frozen=True)
-class Octants:
-    """Octants of finite cells."""
+class Boxes:
+    """Voxels of finite cells, or cells no larger than one."""
 
     cells: FiniteCells
-    cell: Index
-    octant: Index
-    """(k,) which."""
+    portion: Index
+    """(k,) which of the parts that cells have of voxels are in them."""
 
-    def some(self, chosen: Index) -> Octants:
+    def some(self, chosen: Index) -> Boxes:
         """A few of them."""
-        return Octants(self.cells, self.cell[chosen], self.octant[chosen])
+        return Boxes(self.cells, self.portion[chosen])
 
     @property
     def weights(self) -> Array:
-        """Weights (k, 125) of the cells' points, see `FiniteCells`."""
-        return np.asarray(self.cells.weights[self.cells.row[self.cell], self.octant])
+        """Weights (k, d) of the cells' points, see `FiniteCells`."""
+        return np.asarray(self.cells.weights[self.cells.row[self.portion]])
+
+    @cached_property
+    def local(self) -> tuple[Array, Array]:
+        """Lowest corners (k, 3) and edges (k,) in cells of edge one."""
+        low, edge = self.cells.frames()
+        return low[self.portion], edge[self.portion]
 
     @cached_property
     def is_cut(self) -> Flags:
         """Which (k,) the surface cuts."""
-        return np.asarray(self.cells.fractions[self.cell, self.octant] <= 1.0 - 1e-9)
+        return np.asarray(self.cells.shares[self.portion] <= (1.0 - 1e-9) * self.local[1] ** 3)
 
     @cached_property
     def frames(self) -> tuple[Array, Array]:
         """Lowest corners (k, 3) and edges (k,) [m]."""
-        mesh = self.cells.mesh
-        edge = self.cells.span[self.cell] / 2.0
-        lowest = self.cells.grid[self.cell] + edge[:, None] * CORNERS[self.octant]
-        return mesh.origin + mesh.edge * lowest, mesh.edge * edge
+        cells, (low, edge) = self.cells, self.local
+        cell = cells.cell[self.portion]
+        corner = cells.origin + cells.step * cells.corner[cell]
+        return corner + cells.edges[cell, None] * low, cells.edges[cell] * edge
 
     def sampled(self, offsets: Array, function: Callable[[Array], NDArray]) -> NDArray[np.int64]:  # type: ignore[type-arg]
         """Values (k, p) of a function at places `offsets` (p, 3) in them, from 0 to 1."""
@@ -74,62 +81,59 @@ class Octants:
 
 
 @dataclass(frozen=True)
-class OctantParts:
-    """OctantParts of octants by region."""
+class BoxParts:
+    """Parts of boxes by region."""
 
-    octant: Index
+    box: Index
     region: NDArray[np.integer]
     weights: Array
-    """(e,), (e,), (e, 125)."""
-    border_octant: Index
+    """(e,), (e,), (e, d)."""
+    border_box: Index
     border: Array
     """(b,), (b, 3) [m] where lines leave one region for another."""
 
     @classmethod
-    def nothing(cls) -> OctantParts:
-        """No parts."""
+    def nothing(cls, points: int) -> BoxParts:
+        """No parts, of cells with so many points."""
         none = np.empty(0, dtype=np.int64)
-        return cls(none, none, np.empty((0, POINTS)), none, np.empty((0, 3)))
+        return cls(none, none, np.empty((0, points)), none, np.empty((0, 3)))
 
 
-def parts_of_octants(
-    octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt
-) -> OctantParts:
-    """OctantParts of octants that lines across them along `axis` (k,) find."""
+def parts_of_boxes(boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> BoxParts:
+    """Parts of boxes that lines across them along `axis` (k,) find."""
     found = []
-    for groups, chosen in ((GROUPS, ~octants.is_cut), (GROUPS_CUT, octants.is_cut)):
+    for groups, chosen in ((GROUPS, ~boxes.is_cut), (GROUPS_CUT, boxes.is_cut)):
         own = np.flatnonzero(chosen)
-        # A few octants at a time, each with all of its lines.
+        # A few boxes at a time, each with all of its lines.
         step = max(1, AT_ONCE // (len(_across(groups)[0]) * (STEPS + 1)))
         for first in range(0, len(own), step):
             few = own[first : first + step]
-            parts = _parts(octants.some(few), axis[few], regions_at, inside, groups)
-            rows = few[parts.octant], parts.region, parts.weights
-            found.append((*rows, few[parts.border_octant], parts.border))
-    return OctantParts(*(np.concatenate(each) for each in zip(*found, strict=True)))
+            parts = _parts(boxes.some(few), axis[few], regions_at, inside, groups)
+            rows = few[parts.box], parts.region, parts.weights
+            found.append((*rows, few[parts.border_box], parts.border))
+    return BoxParts(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
 def _parts(
-    octants: Octants, axis: Index, regions_at: RegionsAt, inside: InsideAt, groups: int
-) -> OctantParts:
+    boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt, groups: int
+) -> BoxParts:
     places, shares = _across(groups)
-    lines = _Lines(octants, axis, places, regions_at, inside)
+    lines = _Lines(boxes, axis, places, regions_at, inside)
     (line, low, high, region), (crossing, at) = _pieces(lines, len(axis) * len(places))
-    octant, number = np.divmod(line, len(places))
-    weights = _integrals(octants.octant[octant], axis[octant], places[number], low, high)
-    pairs = np.stack([octant, region], axis=1)
+    box, number = np.divmod(line, len(places))
+    pairs = np.stack([box, region], axis=1)
     key, where = np.unique(pairs, axis=0, return_inverse=True)
-    summed = np.zeros((len(key), POINTS))
-    np.add.at(summed, where.ravel(), shares[number, None] * weights)
+    pieces = _LocalPieces(box, axis[box], places[number], low, high, shares[number])
+    summed = _integrals(boxes.cells.basis, boxes.local, pieces, where.ravel(), len(key))
     border = lines.points(crossing, at)
-    return OctantParts(key[:, 0], key[:, 1], summed, crossing // len(places), border)
+    return BoxParts(key[:, 0], key[:, 1], summed, crossing // len(places), border)
 
 
 @dataclass(frozen=True)
 class _Lines:
-    """Lines across octants, those of an octant one after the other."""
+    """Lines across boxes, those of an box one after the other."""
 
-    octants: Octants
+    boxes: Boxes
     axis: Index
     places: Array
     regions_at: RegionsAt
@@ -137,17 +141,17 @@ class _Lines:
 
     def points(self, line: Index, along: Array) -> Array:
         """Points (p, 3) [m] on lines (p,), at places along them from 0 to 1."""
-        octant, number = np.divmod(line, len(self.places))
+        box, number = np.divmod(line, len(self.places))
         local = np.empty((len(line), 3))
-        turned = (self.axis[octant, None] + np.arange(3)) % 3
+        turned = (self.axis[box, None] + np.arange(3)) % 3
         both = np.concatenate([along[:, None], self.places[number]], axis=1)
         np.put_along_axis(local, turned, both, axis=1)
-        corner, edge = self.octants.frames
-        return np.asarray(corner[octant] + edge[octant, None] * local)
+        corner, edge = self.boxes.frames
+        return np.asarray(corner[box] + edge[box, None] * local)
 
     def are_cut(self, line: Index) -> Flags:
-        """Which lines (p,) are in octants that the surface cuts."""
-        return self.octants.is_cut[line // len(self.places)]
+        """Which lines (p,) are in boxes that the surface cuts."""
+        return self.boxes.is_cut[line // len(self.places)]
 
     def regions(self, line: Index, along: Array) -> NDArray[np.int64]:
         """Regions (p,) at places along lines; -1 outside the solid."""
@@ -224,20 +228,49 @@ def _across(groups: int) -> tuple[Array, Array]:
     return np.stack([first.ravel(), second.ravel()], axis=1), np.outer(share, share).ravel()
 
 
-def _integrals(octant: Index, axis: Index, across: Array, low: Array, high: Array) -> Array:
-    """Integrals (p, 125) of the points' Lagrange polynomials over pieces of lines in octants."""
-    nodes, shares = np.polynomial.legendre.leggauss(3)
-    half, rows, length = CORNERS[octant], np.arange(len(octant)), high - low
-    along = np.zeros((len(octant), 5))
-    for node, share in zip(nodes, shares, strict=True):
-        place = (half[rows, axis] + low + length * (node + 1.0) / 2.0) / 2.0
-        along += (0.5 * share * length)[:, None] * lagrange(POINT_PLACES, place)
-    factors = np.empty((len(octant), 3, 5))
-    factors[rows, axis] = along
-    for number in (1, 2):
-        other = (axis + number) % 3
-        place = (half[rows, other] + across[:, number - 1]) / 2.0
-        factors[rows, other] = lagrange(POINT_PLACES, place)
-    product = np.einsum("pk,pj,pi->pkji", factors[:, 2], factors[:, 1], factors[:, 0])
-    # An octant has an eighth of the cell.
-    return np.asarray(product.reshape(len(octant), POINTS) / OCTANTS)
+@dataclass(frozen=True)
+class _LocalPieces:
+    """Pieces of lines in boxes, from 0 to 1 there."""
+
+    box: Index
+    axis: Index
+    across: Array
+    low: Array
+    high: Array
+    share: Array
+    """(p,), (p,), (p, 2), (p,), (p,), (p,) of the box's section that each stands for."""
+
+
+def _integrals(
+    basis: Basis, local: tuple[Array, Array], pieces: _LocalPieces, group: Index, count: int
+) -> Array:
+    """Integrals (count, d) of the points' Lagrange polynomials over pieces, by their `group` (p,).
+
+    `local` are lowest corners (k, 3) and edges (k,) of the boxes in their cells.
+    """
+    nodes, shares = np.polynomial.legendre.leggauss(basis.degree + 1)
+    size = len(basis.lines)
+    summed = np.zeros((count, basis.n_points))
+    order = np.argsort(group, kind="stable")
+    # A few groups at a time, since all products of lines take much room.
+    ends = np.append(np.arange(0, len(order), PIECES_AT_ONCE), len(order))
+    for begin, end in zip(ends[:-1], ends[1:]):
+        few = order[begin:end]
+        corner, edge = local[0][pieces.box[few]], local[1][pieces.box[few]]
+        axis, rows = pieces.axis[few], np.arange(len(few))
+        low, length = pieces.low[few], (pieces.high - pieces.low)[few]
+        along = np.zeros((len(few), size))
+        for node, share in zip(nodes, shares, strict=True):
+            place = corner[rows, axis] + edge * (low + length * (node + 1.0) / 2.0)
+            along += (0.5 * share * length * edge)[:, None] * lagrange(basis.lines, place)
+        factors = np.empty((len(few), 3, size))
+        factors[rows, axis] = along * (edge**2 * pieces.share[few])[:, None]
+        for number in (1, 2):
+            other = (axis + number) % 3
+            place = corner[rows, other] + edge * pieces.across[few, number - 1]
+            factors[rows, other] = lagrange(basis.lines, place)
+        product = np.einsum("pk,pj,pi->pkji", factors[:, 2], factors[:, 1], factors[:, 0])
+        own, where = np.unique(group[few], return_inverse=True)
+        matrix = sp.csr_matrix((np.ones(len(few)), (where.ravel(), rows)), (len(own), len(few)))
+        summed[own] += (matrix @ product.reshape(len(few), -1)) @ basis.from_lines
+    return summed

@@ -12,21 +12,23 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Flags, Index
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.kinks import SMALLEST, Borders
+from carillon.fem.finite_cells.matrices import nodal_mass
 from carillon.fem.finite_cells.region_lines import (
+    Boxes,
+    BoxParts,
     InsideAt,
-    OctantParts,
-    Octants,
     RegionsAt,
-    parts_of_octants,
+    parts_of_boxes,
 )
-from carillon.fem.finite_cells.shapes import POINTS, octant_weights, point_mass, points
 from carillon.fem.finite_cells.shared_cells import SharedCells, point_values
 from carillon.fem.regions import RegionOf
 
 SAMPLES = (0.02, 0.5, 0.98)
-"""Places along a voxel's edge at which regions are looked for."""
+"""Places along a box's edge at which regions are looked for."""
 ROUNDING = 1e-12
 """Share of a whole cell's energy that a part's may be negative by."""
+LEAST_MIXED = 4.0**-12
+"""Least share of a cell's regions that is mixed where a part's energy is negative."""
 FLAT = 1e-6
 """Least extent of the points of a border across each other, in cells, for a plane through them."""
 
@@ -38,47 +40,52 @@ def regions_of_cells(
 
     `inside` tells whether points (p, 3) [m] are inside the solid's surface.
     """
-    cell, octant = np.nonzero(cells.voxels >= 0)
-    octants = Octants(cells, cell, octant)
-    seen = _seen(octants, regions_at, inside)
+    boxes = Boxes(cells, np.arange(len(cells.cell)))
+    seen = _seen(boxes, regions_at, inside)
     region = seen.max(axis=1)
     split = np.flatnonzero(_varies(seen))
-    parts = OctantParts.nothing()
+    parts = BoxParts.nothing(cells.basis.n_points)
     if len(split):
-        some = octants.some(split)
-        parts = _complete(
-            parts_of_octants(some, _axes_across(seen[split]), regions_at, inside),
-            some.weights,
-            seen[split],
-        )
-        volume = np.zeros((len(split), int(seen.max()) + 1))
-        np.add.at(volume, (parts.octant, parts.region), parts.weights.sum(axis=1))
-        region[split] = volume.argmax(axis=1)
-    # A voxel's octants, of a divided cell, are all in it: the largest decides.
-    order = np.argsort(cells.fractions[cell, octant], kind="stable")
-    of_voxel = np.full(cells.mesh.n_cells, -1)
-    of_voxel[cells.voxels[cell, octant][order]] = region[order]
-    nowhere = of_voxel < 0
-    found = np.maximum(of_voxel, 0).astype(np.uint16)
+        some = boxes.some(split)
+        axes = _axes_across(seen[split])
+        found = parts_of_boxes(some, axes, regions_at, inside)
+        parts = _complete(found, some.weights, seen[split])
+    # A voxel is of the region that most of it is of, in all cells that have some of it.
+    whole = np.ones(len(region), dtype=bool)
+    whole[split] = False
+    whole &= region >= 0
+    cube = cells.edges[cells.cell] ** 3
+    portion = np.append(np.flatnonzero(whole), split[parts.box])
+    share = np.append(cells.shares[whole], parts.weights.sum(axis=1)) * cube[portion]
+    number = np.append(region[whole], parts.region)
+    volume = np.zeros((cells.mesh.n_cells, int(seen.max(initial=0)) + 1))
+    np.add.at(volume, (cells.voxel[portion], number), share)
+    found_regions = volume.argmax(axis=1).astype(np.uint16)
+    nowhere = ~volume.any(axis=1)
+    # What is all of one region, but not of its voxel's, is a part, too.
+    other = np.flatnonzero(whole & (region != found_regions[cells.voxel]))
     shared = SharedCells(
-        cell[split][parts.octant],
-        octant[split][parts.octant],
-        parts.region.astype(np.uint16),
-        parts.weights,
+        np.append(split[parts.box], other),
+        np.append(parts.region, region[other]).astype(np.uint16),
+        np.concatenate([parts.weights, cells.weights[cells.row[other]]]),
         Borders.nothing(),
     )
-    border_cell = cell[split][parts.border_octant]
-    return found, _with_borders(cells, found, shared, border_cell, parts.border), nowhere
+    border_cell = cells.cell[split[parts.border_box]].astype(np.int64)
+    return (
+        found_regions,
+        _with_borders(cells, found_regions, shared, border_cell, parts.border),
+        nowhere,
+    )
 
 
-def _seen(octants: Octants, regions_at: RegionsAt, inside: InsideAt) -> NDArray[np.int64]:
-    """Regions (k, 27) at samples of octants; -1 where there is none, or outside the solid."""
+def _seen(boxes: Boxes, regions_at: RegionsAt, inside: InsideAt) -> NDArray[np.int64]:
+    """Regions (k, 27) at samples of boxes; -1 where there is none, or outside the solid."""
     offsets = np.array([[x, y, z] for z in SAMPLES for y in SAMPLES for x in SAMPLES])
-    seen = octants.sampled(offsets, regions_at)
-    cut = np.flatnonzero(octants.is_cut)
+    seen = boxes.sampled(offsets, regions_at)
+    cut = np.flatnonzero(boxes.is_cut)
     mixed = cut[_varies(seen[cut])]
     if len(mixed):
-        is_inside = octants.some(mixed).sampled(offsets, inside).astype(bool)
+        is_inside = boxes.some(mixed).sampled(offsets, inside).astype(bool)
         left = np.where(is_inside, seen[mixed], -1)
         # Too thin for the samples: all of them count.
         seen[mixed] = np.where((left < 0).all(axis=1, keepdims=True), seen[mixed], left)
@@ -97,13 +104,13 @@ def _most(row: NDArray[np.int64]) -> int:
     return int(np.bincount(there).argmax()) if len(there) else -1
 
 
-def _complete(parts: OctantParts, exact: Array, seen: NDArray[np.int64]) -> OctantParts:
-    """The parts with what lines miss of the weights (k, 125) of octants, in proportion to them.
+def _complete(parts: BoxParts, exact: Array, seen: NDArray[np.int64]) -> BoxParts:
+    """The parts with what lines miss of the weights (k, d) of boxes, in proportion to them.
 
-    That is what octants have taken in from slight neighbours, and rounding. Octants that lines find
+    That is what boxes have taken in from slight neighbours, and rounding. Boxes that lines find
     nothing of are of the commonest sample's region.
     """
-    row, region, weights = parts.octant, parts.region, parts.weights
+    row, region, weights = parts.box, parts.region, parts.weights
     found = np.zeros_like(exact)
     np.add.at(found, row, weights)
     total = np.bincount(row, weights.sum(axis=1), minlength=len(exact))
@@ -114,7 +121,7 @@ def _complete(parts: OctantParts, exact: Array, seen: NDArray[np.int64]) -> Octa
         most = [_most(samples) for samples in seen[missed]]
         row, region = np.append(row, missed), np.append(region, most)
         weights = np.concatenate([weights, exact[missed]])
-    return OctantParts(row, region, weights, parts.border_octant, parts.border)
+    return BoxParts(row, region, weights, parts.border_box, parts.border)
 
 
 def _axes_across(seen: NDArray[np.int64]) -> Index:
@@ -135,9 +142,9 @@ def _with_borders(
 
     `border` (b, 3) [m] are points of borders in cells (b,).
     """
-    shared = _made_definite(cells, region, shared)
-    ones = np.ones(cells.mesh.n_cells), np.ones(len(shared.cell))
-    inside, law = point_values(cells, region, shared, *ones)
+    ones = np.ones(cells.mesh.n_cells), np.ones(len(shared.portion))
+    inside, law = point_values(cells, region, shared, *ones, 0.0)
+    shared = _made_definite(cells, shared, inside, law)
     if law.shape[1] < 2:
         return shared
     volume = inside.sum(axis=2)
@@ -149,9 +156,12 @@ def _with_borders(
     slots = np.argsort(~there[own], axis=1, kind="stable")[:, :2]
     both = np.take_along_axis(volume[own], slots, axis=1)
     weights = np.take_along_axis(inside[own], slots[:, :, None], axis=1)
-    middles = weights @ points() / both[:, :, None]
+    middles = weights @ cells.basis.points / both[:, :, None]
     across = middles[:, 1] - middles[:, 0]
-    normal = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    length = np.linalg.norm(across, axis=1)
+    apart = length > FLAT  # of which neither is all around the other
+    own, slots, both, across = own[apart], slots[apart], both[apart], across[apart]
+    normal = across / length[apart, None]
     place = np.full((len(own), 3), 0.5)
     _fit_planes(cells, own, cell, border, place, normal)
     borders = Borders(
@@ -161,44 +171,49 @@ def _with_borders(
         normal,
         both / both.sum(axis=1, keepdims=True),
     )
-    return SharedCells(shared.cell, shared.octant, shared.region, shared.weights, borders)
+    return SharedCells(shared.portion, shared.region, shared.weights, borders)
 
 
-def _made_definite(cells: FiniteCells, region: RegionOf, shared: SharedCells) -> SharedCells:
-    """What cells share, with as little of the whole cell moved as makes energies positive.
+def _made_definite(
+    cells: FiniteCells, shared: SharedCells, inside: Array, law: RegionOf
+) -> SharedCells:
+    """What cells share, with regions mixed in a cell by as little as makes energies positive.
 
-    What lines miss of an octant is in its largest part, and may be negative somewhere.
+    What lines miss of a box is in its parts by their volumes, and may be negative somewhere. Mixing
+    leaves each region its volume, and all together what they are. See `point_values` for the
+    weights `inside` (c, s, d) and the regions `law` (c, s).
     """
-    own, first = np.unique(shared.cell, return_index=True)
+    own, first = np.unique(cells.cell[shared.portion], return_index=True)
     if not len(own):
         return shared
-    ones = np.ones(cells.mesh.n_cells), np.ones(len(shared.cell))
-    inside, law = point_values(cells, region, shared, *ones)
-    products = point_mass()
-    whole = (octant_weights().sum(axis=0) @ products).reshape(27, 27)
-    inverse = np.linalg.inv(np.linalg.cholesky(whole))
-    grams = (inside[own].reshape(-1, POINTS) @ products).reshape(-1, 27, 27)
-    least = np.linalg.eigvalsh(inverse @ grams @ inverse.T)[:, 0].reshape(len(own), -1)
-    row, slot = np.nonzero(least < -ROUNDING)
-    lacks = -least[row, slot]
-    # Moved from the part that has most to spare, so that all together stays what it is.
-    spare = least.argmax(axis=1)[row]
-    can = least[row, spare] > lacks
-    numbers = shared.region.copy()
-    for number in np.flatnonzero(~can):
-        # A sliver that no other part can mend is of that part.
-        cell = own[row[number]]
-        sliver = (shared.cell == cell) & (shared.region == law[cell, slot[number]])
-        numbers[sliver] = law[cell, spare[number]]
-    row, slot, spare, lacks = row[can], slot[can], spare[can], lacks[can]
-    cell = np.tile(own[row], 2)
-    share = np.append(lacks, -lacks)
+    inside, law = inside[own], law[own]
+    total = inside.sum(axis=1)
+    volume = inside.sum(axis=2) / total.sum(axis=1)[:, None]
+    mixed = volume[:, :, None] * total[:, None] - inside
+    share = np.zeros(len(own))
+    left, step = np.arange(len(own)), LEAST_MIXED
+    while True:
+        now = inside[left] + share[left, None, None] * mixed[left]
+        left = left[_least_energies(cells, now).min(axis=1) < -ROUNDING]
+        if not len(left) or step > 1.0:
+            break
+        share[left], step = step, 4.0 * step
+    cell, slot = np.nonzero((share[:, None] > 0.0) & (volume > 0.0))
     return SharedCells(
-        np.append(shared.cell, cell),
-        np.append(shared.octant, np.tile(shared.octant[first][row], 2)),
-        np.concatenate([numbers, law[own[row], slot], law[own[row], spare]]),
-        np.concatenate([shared.weights, share[:, None] * octant_weights().sum(axis=0)]),
+        np.append(shared.portion, shared.portion[first][cell]),
+        np.concatenate([shared.region, law[cell, slot]]),
+        np.concatenate([shared.weights, share[cell, None] * mixed[cell, slot]]),
         shared.borders,
+    )
+
+
+def _least_energies(cells: FiniteCells, inside: Array) -> Array:
+    """Least eigenvalues (c, s) of the masses of parts with weights (c, s, d), by a whole cell's."""
+    whole = nodal_mass(cells.degree, cells.basis.whole[None])[0]
+    inverse = np.linalg.inv(np.linalg.cholesky(whole))
+    grams = nodal_mass(cells.degree, inside.reshape(-1, cells.basis.n_points))
+    return np.asarray(
+        np.linalg.eigvalsh(inverse @ grams @ inverse.T)[:, 0].reshape(inside.shape[:2])
     )
 
 
@@ -208,8 +223,8 @@ def _fit_planes(
     """Put planes through the points of borders, where there are enough of them."""
     order = np.argsort(cell, kind="stable")
     cell, border = cell[order], border[order]
-    edge = cells.mesh.edge * cells.span[cell]
-    corner = cells.mesh.origin + cells.mesh.edge * cells.grid[cell]
+    edge = cells.edges[cell]
+    corner = cells.origin + cells.step * cells.corner[cell]
     local = (border - corner) / edge[:, None]
     first = np.searchsorted(cell, own)
     last = np.searchsorted(cell, own, side="right")
