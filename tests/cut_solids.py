@@ -5,8 +5,10 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.transformations import euler_matrix
 
+from carillon.fem.element import CORNERS
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.finite_cells.cells import FiniteCells
+from carillon.fem.finite_cells.covering import Covering
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.regions import Regions
 from solver.analysis.modal_solver import modal_analysis
@@ -39,3 +41,17 @@ def uniform(cells: FiniteCells) -> FiniteCellModel:
 def eigenvalues(model: FiniteCellModel, count: int) -> NDArray[np.float64]:
     """The lowest ones by SLEPc."""
     return modal_analysis(model, SolverOptions(modes=count, method="slepc")).values
+
+
+def divided(cover: Covering, shares: tuple[float, ...], seed: int = 1) -> FiniteCells:
+    """Cells of which a share of each level is divided, one at least, chosen at random."""
+    rng = np.random.default_rng(seed)
+    cells = cover.cells
+    places = np.unique(cells.corner // cells.span[:, None], axis=0).astype(np.int64)
+    chosen = []
+    for share in shares:
+        some = rng.random(len(places)) < share
+        some[rng.integers(len(places))] = True
+        chosen.append(places[some])
+        places = (2 * chosen[-1][:, None] + CORNERS).reshape(-1, 3)
+    return cover.divided(chosen)

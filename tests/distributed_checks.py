@@ -20,6 +20,7 @@ from mpi4py import MPI
 
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.block import degrees_of_freedom
+from carillon.fem.finite_cells.build import covering
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.geometry.hanging import WHOLE
@@ -46,7 +47,7 @@ from solver.linear.factorisation import count_negative
 from solver.linear.multigrid import Multigrid
 from solver.linear.shared_factor import SharedFactor
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
-from tests import cut_solids, solids
+from tests import cut_solids, octrees, solids
 
 ROOMS = ("/solver/", "/carillon/fem/")
 COMM = MPI.COMM_WORLD
@@ -541,6 +542,23 @@ def all_ranks_factorise() -> None:
             inverse.destroy()
 
 
+def all_ranks_factorise_through_cells_of_several_sizes() -> None:
+    line = octrees.about_a_line(np.array([1.0, 0.53, 0.57]), np.array([1.0, 0.3, 0.2]), 0.4)
+    mesh = octrees.octree([(0, 0, 0), (1, 0, 0)], 3, line)
+    model = octrees.solid_of(mesh) if COMM.rank == 0 else None
+    local_mesh = distribute(model, comm=COMM, by_planes=True)
+    largest = COMM.allreduce(local_mesh.stop - local_mesh.start, MPI.MAX)
+    assert largest < 1.6 * len(mesh.lattice) / COMM.size
+    layout = Layout.of_local_mesh(local_mesh, COMM)
+    system, linear = assemble(local_mesh, COMM, layout), LinearSolver("multifrontal", layout)
+    block = np.random.default_rng(COMM.rank).standard_normal((len(system.rigid), 5))
+    inverse = linear.inverse(system, -1.0)
+    found = inverse.solve(block)
+    residual = system.times_stiffness(found) + system.times_mass(found) - block
+    assert np.abs(residual).max() < 1e-9
+    assert inverse.negative == 0 and linear.count_below(system, 1e-6) == 6
+
+
 def a_rank_that_fails_to_factorise_ends_all() -> None:
     local_mesh = distribute(on_first(solids.random_box(9, 6, 5)), comm=COMM, by_planes=True)
     layout = Layout.of_local_mesh(local_mesh, COMM)
@@ -634,14 +652,16 @@ def repetitions_with_mumps_agree_to_the_tolerance() -> None:
 
 
 def finite_cells_on_ranks() -> None:
-    cells = cut_solids.spaced(cut_solids.turned(cut_solids.box(0.2, 0.05, 0.03)), 0.02)
-    young = 1e9 * 10.0 ** np.random.default_rng(1).uniform(-1.0, 1.0, cells.mesh.n_cells)
-    model = finite_cell_model(cells, young)
-    exact = solids.dense_eigenvalues(model)
-    for method in ("hcms", "slepc"):
-        options = SolverOptions(modes=24, method=method, subdomains=5, tolerance=1e-10)
-        values = modal_analysis(on_first(model), options, COMM).values
-        assert np.abs(values[6:] / exact[6:24] - 1.0).max() < 1e-7, method
+    cover = covering(cut_solids.turned(cut_solids.box(0.2, 0.05, 0.03)), 9)
+    for shares in ((), (0.4, 0.2)):
+        cells = cut_solids.divided(cover, shares)
+        young = 1e9 * 10.0 ** np.random.default_rng(1).uniform(-1.0, 1.0, cells.mesh.n_cells)
+        model = finite_cell_model(cells, young)
+        exact = solids.dense_eigenvalues(model)
+        for method in ("hcms", "slepc"):
+            options = SolverOptions(modes=24, method=method, subdomains=5, tolerance=1e-10)
+            values = modal_analysis(on_first(model), options, COMM).values
+            assert np.abs(values[6:] / exact[6:24] - 1.0).max() < 1e-7, (method, shares)
 
 
 if __name__ == "__main__":

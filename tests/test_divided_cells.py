@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
-from carillon.fem.block import NODES, degrees_of_freedom
-from carillon.fem.element import elasticity_matrix
-from carillon.fem.finite_cells import hanging
 from carillon.fem.finite_cells.build import covering, finite_cells
 from carillon.fem.finite_cells.covering import Covering
-from carillon.fem.finite_cells.shapes import shape_functions
 from carillon.fem.geometry import builtin_surface
-from carillon.fem.geometry.grid import Grid
-from carillon.fem.laplacian import laplacian_modes
 from solver.__main__ import main
-from solver.accuracy import solving
+from solver.accuracy import divide, solving
 from solver.accuracy.divide import DividedCells
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.files.modes_file import read_modes
@@ -28,103 +22,9 @@ from tests.rank_counts import TO_THREE
 CELLS = ["--discretisation", "finite-cell"]
 
 
-def divided(name: str, resolution: int, share: float = 0.4):
-    """The undivided cells of a built-in solid, and the same with some of them divided."""
-    cover = covering(builtin_surface(name), resolution)
-    places = np.unique(cover.cells.grid, axis=0)
-    chosen = np.random.default_rng(1).random(len(places)) < share
-    return cover.cells, cover.divided(places[chosen])
-
-
-@pytest.fixture(scope="module", params=["bell", "fork"])
-def some(request):
-    return divided(request.param, 14)
-
-
 def solved(model, modes, method="slepc"):
     found = solids.analysed(model, modes=modes, method=method)
     return found.values, found.system.gather(found.vectors)
-
-
-def test_divided_cells_fit_each_other(some):
-    whole, division = some
-    cells = division.cells
-    assert cells.is_mixed and cells.is_consistent()
-    assert set(np.unique(cells.span)) == {2, 4}
-    assert cells.volume == pytest.approx(whole.volume, rel=1e-2)
-    assert (np.diff(np.unique(division.parent)) > 0).all()
-    np.testing.assert_array_equal(cells.grid // 4 * 2, whole.grid[division.parent])
-    # In one piece, by the neighbours that share faces.
-    assert (laplacian_modes(uniform(cells).hexmesh, 2)[0] > 1e-9).tolist() == [False, True]
-
-
-def test_linear_displacements_have_the_energy_of_the_solid(some):
-    cells = some[1].cells
-    model = uniform(cells)
-    nodes = degrees_of_freedom(cells.nodes.astype(np.int64))
-    stiffness = model.stiffness()
-    strain = np.array([[1.0, 0.3, 0.2], [0.3, -1.0, 0.5], [0.2, 0.5, 0.7]])
-    for gradient in (strain, np.array([[0.0, 1.0, -2.0], [-1.0, 0.0, 3.0], [2.0, -3.0, 0.0]])):
-        motion = (cells.mesh.nodes @ gradient).ravel()[nodes]
-        energy = np.einsum("ci,cij,cj->", motion, stiffness, motion)
-        sym = 0.5 * (gradient + gradient.T)
-        voigt = np.array([*np.diag(sym), 2 * sym[0, 1], 2 * sym[1, 2], 2 * sym[0, 2]])
-        exact = cut_solids.YOUNG * cells.volume * voigt @ elasticity_matrix(0.25) @ voigt
-        assert energy == pytest.approx(exact, rel=1e-6, abs=1e-8 * cut_solids.YOUNG * cells.volume)
-
-
-def test_all_divided_are_those_of_the_finer_lattice():
-    surface = builtin_surface("bell")
-    cover = covering(surface, 8)
-    cells = cover.divided(np.unique(cover.cells.grid, axis=0)).cells
-    nx, ny, nz = (2 * size for size in cover.grid.shape)
-    lattice = Grid(cover.grid.origin, cover.grid.edge / 2.0, (nx, ny, nz))
-    fine = uniform(finite_cells(surface, 16, grid=lattice))
-    assert cells.mesh.n_nodes == fine.mesh.n_nodes and not cells.is_mixed
-    found, exact = (cut_solids.eigenvalues(model, 14)[6:] for model in (uniform(cells), fine))
-    np.testing.assert_allclose(found, exact, rtol=1e-7)
-
-
-def test_hanging_nodes_say_what_the_whole_cell_says():
-    """A quadratic field on a whole cell is the same in the small ones that hang from it."""
-    field = np.random.default_rng(2).standard_normal(27)
-    for octant in range(8):
-        corner = np.array([octant & 1, octant >> 1 & 1, octant >> 2])
-        low = corner == 0
-        on_faces = ((NODES == 0) & low) | ((NODES == 2) & ~low)
-        middles = (NODES == 1).any(axis=1)
-        # All that lies on the three outer faces of the whole cell hangs.
-        kind = hanging.kinds_of_cells(np.array([octant]), (on_faces.any(axis=1) & middles)[None])
-        places = (corner * 2 + hanging.node_places(kind)[0]) / 4.0
-        values = hanging.node_weights(kind)[0] @ (shape_functions(places) @ field)
-        np.testing.assert_allclose(
-            values, shape_functions((corner * 2 + NODES) / 4.0) @ field, atol=1e-12
-        )
-
-
-def test_every_method_finds_their_modes(some):
-    model = uniform(some[1].cells)
-    found = [solved(model, 20, method)[0][6:] for method in ("hcms", "slepc")]
-    np.testing.assert_allclose(*found, rtol=1e-7)
-
-
-def test_frequencies_fall_where_cells_are_divided():
-    whole, division = divided("fork", 14)
-    coarse, fine = (
-        cut_solids.eigenvalues(uniform(cells), 20)[6:] for cells in (whole, division.cells)
-    )
-    assert (fine < coarse * (1.0 + 1e-3)).all() and fine[0] < 0.98 * coarse[0]
-
-
-@pytest.mark.parametrize(
-    ("name", "spacing"), [("ellipsoid", 0.03), ("block", 0.03), ("beam", 0.02)]
-)
-def test_no_mode_is_slower_than_that_of_the_solid(name, spacing):
-    """What a surface barely cuts off moves with its neighbours."""
-    solid = SOLIDS[name]
-    exact = solid.frequencies(30, fewer=4)
-    values = cut_solids.eigenvalues(uniform(spaced(solid.surface(), spacing)), 36)[6:]
-    assert (np.sqrt(values) / (2.0 * np.pi * exact)).min() > 0.998
 
 
 @pytest.mark.parametrize(
@@ -147,12 +47,13 @@ def test_cells_are_divided_where_edges_point_inwards():
     cells = DividedCells(cover, model)
     first, done = cells.advance(*solved(model, 30), 0.02)
     assert not done and first.errors.rms > 0.02
-    assert cells.model.n_dofs < 2 * model.n_dofs
-    second, _ = cells.advance(*solved(cells.model, 30), 0.02)
-    assert second.errors.rms < 0.7 * first.errors.rms
+    while not done:
+        last, done = cells.advance(*solved(cells.model, 30), 0.02)
+    assert last.errors.rms <= 0.02 < 0.06 and cells.model.n_dofs < 10 * model.n_dofs
     # The handle's joint, on one side of the pan.
-    middle = cells.model.cells.grid[cells.model.cells.span == 2].mean(axis=0)
-    assert middle[0] > 1.2 * cells.model.cells.grid[:, 0].mean()
+    found = cells.model.cells
+    middle = found.corner[found.levels == found.levels.max()].mean(axis=0)
+    assert middle[0] > 1.2 * found.corner[:, 0].mean()
 
 
 @pytest.fixture(scope="module")
@@ -179,7 +80,7 @@ def test_any_number_of_ranks_divides_the_same_cells(ranks, alone, mpiexec, tmp_p
 
 def test_files_hold_divided_cells(alone):
     file = alone[1]
-    assert file.model.cells.is_mixed and file.model.cells.is_consistent()
+    assert file.model.cells.levels.max() > 0 and file.model.cells.is_consistent()
     values = solids.analysed(file.model, modes=20, method="slepc").values
     np.testing.assert_allclose(values[6:], file.eigenvalues[6:], rtol=1e-6)
     # Two materials: the voxels of divided cells have those of where they are.
@@ -205,13 +106,14 @@ def test_far_too_large_cells_say_that_they_are_far_off(name, resolution, tmp_pat
     out = str(tmp_path / "modes.h5")
     command = ["modes", f"builtin:{name}", "--modes", "36", *CELLS, "--out", out, "--json"]
     told = []
-    for spacings in (resolution, 32):
-        main([*command, "--resolution", str(spacings)])
+    for words in (["--resolution", str(resolution), "--refine-to", "0"], ["--resolution", "32"]):
+        main([*command, *words])
         told.append(json.loads(capsys.readouterr().out))
     here, near = (np.array(each["frequencies_hz"][6:]) for each in told)
     ratio = told[0]["solid_frequency_error_rms"] / np.sqrt(np.mean((here / near - 1.0) ** 2))
-    # As docs/explanation/finite-cells.md says: large, but perhaps less than half of the true one.
-    assert told[0]["solid_frequency_error_rms"] > 0.14 and 0.4 < ratio < 2.2
+    # As docs/explanation/finite-cells.md says: large, but perhaps less than half of the true one,
+    # which is 12 % at least.
+    assert told[0]["solid_frequency_error_rms"] > 0.12 and 0.4 < ratio < 2.2
 
 
 def test_cells_stay_whole_where_dividing_them_fails(tmp_path, capsys, monkeypatch):
@@ -232,6 +134,8 @@ def test_cells_stay_whole_where_dividing_them_fails(tmp_path, capsys, monkeypatc
 def test_a_resolution_is_chosen(tmp_path, capsys, monkeypatch):
     out = str(tmp_path / "modes.h5")
     command = ["modes", "builtin:plate", "--modes", "16", *CELLS, "--out", out]
+    monkeypatch.setattr(divide, "LARGEST", 0)
+    monkeypatch.setattr(divide, "MOST_GROWTH", 1.0)
     main([*command, "--resolution", "6", "--accuracy", "0.02", "--json"])
     told = json.loads(capsys.readouterr().out)
     assert told["resolution"] > 6 and told["solid_frequency_error_rms"] <= 0.02

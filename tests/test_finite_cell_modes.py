@@ -75,7 +75,8 @@ def test_frequencies_fall_towards_those_of_the_solid():
     for spacing in (0.05, 0.025, 0.0125):
         model = uniform(spaced(turned(box(*sides)), spacing))
         errors.append(np.abs(cut_solids.eigenvalues(model, 12)[6:] / exact - 1))
-    assert (errors[1] < errors[0]).all() and (errors[2] < errors[1]).all()
+    # The solution by polynomials is near to a hundred-thousandth or so itself.
+    assert (errors[1] < errors[0]).all() and (errors[2] < np.maximum(errors[1], 2e-5)).all()
     # Fourth order in the spacing where modes are smooth; edges take a part of it.
     rates = np.log2(errors[0] / errors[2]) / 2.0
     assert rates.min() > 2.0 and np.median(rates) > 2.5
@@ -158,13 +159,27 @@ def test_modes_of_voxels_are_told_on_finite_cells_and_back(tmp_path):
     "change",
     [
         ("finite_cells/row", lambda values: values + 10**6),
+        ("finite_cells/row", lambda values: values[1:]),
         ("finite_cells/nodes", lambda values: values[:, ::-1]),
-        ("finite_cells/voxels", lambda values: values[::-1]),
-        ("finite_cells/weights", lambda values: values[1:]),
-        ("finite_cells/weights", lambda values: np.where(np.arange(125) == 3, np.nan, values)),
+        ("finite_cells/nodes", lambda values: values - 1),
+        ("finite_cells/nodes", lambda values: values[1:]),
+        ("finite_cells/corner", lambda values: values + 1),
+        ("finite_cells/span", lambda values: 2 * values),
+        ("finite_cells/span", lambda values: 0 * values),
+        ("finite_cells/kinds", lambda values: values + 8),
+        ("finite_cells/kinds", lambda values: values + (8 << 6)),
+        ("finite_cells/voxel_nodes", lambda values: values + 1),
+        ("finite_cells/cell", lambda values: values[::-1]),
+        ("finite_cells/cell", lambda values: values + 1),
+        ("finite_cells/place", lambda values: values + 64),
+        ("finite_cells/voxel", lambda values: values + 1),
+        ("finite_cells/voxel", lambda values: values - 10**6),
+        ("finite_cells/weights", lambda values: values[:1]),
+        ("finite_cells/weights", lambda values: -values),
+        ("finite_cells/weights", lambda values: np.where(np.arange(295) == 3, np.nan, values)),
         ("young", lambda values: values[:-1]),
     ],
-    ids=["rows", "nodes", "voxels", "first weights", "not finite", "moduli"],
+    ids=lambda change: change[0],
 )
 def test_files_that_do_not_fit_are_refused(written, tmp_path, change):
     path = tmp_path / "other.h5"
@@ -172,6 +187,16 @@ def test_files_that_do_not_fit_are_refused(written, tmp_path, change):
     with edited(path) as file:
         put(*change)(file)
     with pytest.raises(UserError):
+        read_modes(path)
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.99])
+def test_steps_of_nodes_that_are_not_those_of_voxels_are_refused(written, tmp_path, factor):
+    path = tmp_path / "other.h5"
+    path.write_bytes(written.read_bytes())
+    with edited(path) as file:
+        file["finite_cells"].attrs["step"] *= factor
+    with pytest.raises(UserError, match="do not fit each other"):
         read_modes(path)
 
 
@@ -209,13 +234,17 @@ def test_a_material_of_voxels_is_refused(tmp_path):
 
 
 def test_points_of_the_surface_move_with_it():
-    """Quadratic displacements are found exactly wherever a point of the solid lies."""
+    """Quartic displacements are found exactly wherever a point of the solid lies."""
     surface = turned(box(0.2, 0.12, 0.05))
     model = uniform(spaced(surface, 0.02))
     points = np.asarray(surface.subdivide().vertices)
-    nodes = model.mesh.nodes
-    found = interpolation(model, points) @ (nodes[:, 0] * nodes[:, 1] - nodes[:, 2] ** 2)
-    assert np.allclose(found, points[:, 0] * points[:, 1] - points[:, 2] ** 2, atol=1e-12)
+
+    def field(places):
+        x, y, z = places.T / 0.1
+        return x**3 * y - z**4 + x * y * z**2
+
+    found = interpolation(model, points) @ field(model.positions)
+    assert np.allclose(found, field(points), atol=1e-12)
 
 
 def test_bad_words_get_one_sentence(refuses):

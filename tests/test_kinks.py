@@ -29,7 +29,7 @@ def longitudinal(model):
 
     K, M = (matrix.toarray() for matrix in assembled(model))
     # One displacement for all nodes of a section: without Poisson's effect sections stay plane.
-    places, section = np.unique(model.mesh.nodes[:, 0].round(9), return_inverse=True)
+    places, section = np.unique(model.positions[:, 0].round(9), return_inverse=True)
     along = np.zeros((len(K), len(places)))
     along[3 * np.arange(len(section)), section] = 1.0
     return la.eigh(along.T @ K @ along, along.T @ M @ along, eigvals_only=True)[1:3]

@@ -8,13 +8,14 @@ from scipy.sparse.linalg import eigsh
 
 import carillon as ca
 from carillon.command_line.exit_status import EXIT_BAD_INPUT
+from carillon.fem.finite_cells.build import covering
+from carillon.fem.geometry import builtin_surface
 from carillon.processes.petsc import PETSc
 from solver.__main__ import main
 from solver.assembly.sparse import assembled
 from solver.exchange.matrices import matrices
 from tests import solids
-from tests.cut_solids import uniform
-from tests.test_divided_cells import divided
+from tests.cut_solids import divided, uniform
 from tests.test_refinement import mixed_model
 
 SOLID = ["builtin:bar", "--resolution", "8", "--material", "two-region"]
@@ -55,7 +56,7 @@ def test_rows_are_components_of_the_nodes_that_are_written(solution, tmp_path):
     assert main(["matrices", str(solution), *words, f"--nodes={tmp_path / 'nodes.npy'}"]) == 0
     K, M = (sp.load_npz(tmp_path / f"{each}.npz") for each in ("stiffness", "mass"))
     nodes = np.load(tmp_path / "nodes.npy")
-    np.testing.assert_array_equal(nodes, ca.read(solution).mesh.nodes)
+    np.testing.assert_array_equal(nodes, ca.read(solution).solid.positions)
     turned = np.cross([0.3, -0.2, 0.9], nodes).ravel()
     assert abs(K @ turned).max() < 1e-12 * abs(K).max() * abs(turned).max()
     along_y = np.tile([0.0, 1.0, 0.0], len(nodes))
@@ -67,7 +68,7 @@ def test_rows_are_components_of_the_nodes_that_are_written(solution, tmp_path):
     [
         solids.random_box(3, 2, 2),
         mixed_model(0)[1],
-        uniform(divided("bell", 10)[1].cells),
+        uniform(divided(covering(builtin_surface("bell"), 10), (0.3, 0.1))),
     ],
     ids=["voxels", "mixed", "finite cells"],
 )

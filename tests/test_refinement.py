@@ -206,7 +206,7 @@ def test_patch_of_constant_strain(seed):
     model = build_model(fine, young, make_coarsening("galerkin"), refined, regions=Regions.one(0.3))
     K, M = assembled(model)
     nodes = blocks.coarse.nodes
-    rigid = rigid_motions(nodes, nodes.mean(axis=0))
+    rigid = rigid_motions(nodes.astype(float), nodes.mean(axis=0))
     scale = np.abs(K).max() * np.abs(rigid).max()
     assert np.abs(K @ rigid).max() < 1e-13 * scale
     gradient = np.random.default_rng(seed).standard_normal((3, 3))
@@ -246,12 +246,15 @@ def test_relaxed_elements_with_hanging_corners_are_free(interface):
     young = np.random.default_rng(1).uniform(0.1, 10.0, (len(kinds), 8))
     fill = np.full(len(kinds), 255, dtype=np.uint8)
     elements = HexElements(young, fill, 1.0, Regions.one(0.25, 1.0), False, 0.0, kinds)
-    stiffness, places = elements.stiffness(), elements.node_places.astype(float)
+    stiffness, places = elements.stiffness(), elements.node_places
     for corners in combinations(range(8), 3):
         inside = np.broadcast_to(np.isin(np.arange(8), corners), (len(kinds), 8))
-        relaxed = restrict_stiffness(stiffness, inside, interface, elements.collinear)
+        relaxed = restrict_stiffness(stiffness, inside, interface, places)
         for matrix, nodes in zip(relaxed, places):
-            motions = rigid_motions(nodes, nodes.mean(axis=0)) * np.repeat(inside[0], 3)[:, None]
+            motions = (
+                rigid_motions(nodes.astype(float), nodes.mean(axis=0))
+                * np.repeat(inside[0], 3)[:, None]
+            )
             assert np.abs(matrix @ motions).max() < 1e-11
             assert la.eigvalsh(matrix)[0] > -1e-11
 
@@ -286,12 +289,20 @@ def test_every_method_finds_the_modes_of_a_mixed_model(method):
     assert np.abs(values[6:] / exact[6:30] - 1.0).max() < 1e-9
 
 
-def test_no_element_reaches_past_a_plane():
-    _, mixed, _ = solids.bar_models()
-    local_mesh = distribute(mixed, 5, comm=COMM)
+@pytest.mark.parametrize("number", [0, 2])
+def test_no_element_of_one_size_reaches_past_a_plane(number):
+    model = solids.bar_models()[number]
+    local_mesh = distribute(model, 5, comm=COMM)
     places = local_mesh.lattice()[local_mesh.cells.corners]
     steps = local_mesh.cells.elements.steps
     assert (-(-places.max(axis=1) // steps) - places.min(axis=1) // steps <= 1).all()
+    assert np.array_equal(local_mesh.lattice(), model.mesh.node_grid[local_mesh.nodes])
+
+
+def test_planes_pass_through_elements_of_two_sizes():
+    _, mixed, _ = solids.bar_models()
+    local_mesh = distribute(mixed, 5, comm=COMM)
+    assert local_mesh.cells.elements.steps is None
     assert np.array_equal(local_mesh.lattice(), mixed.mesh.node_grid[local_mesh.nodes])
 
 

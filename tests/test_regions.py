@@ -13,7 +13,7 @@ from carillon.composition.places import Box, Chosen, ClosedSurface, Everywhere, 
 from carillon.errors import UserError
 from carillon.fem import elements
 from carillon.fem.elasticity import axes_along
-from carillon.fem.finite_cells.build import finite_cells
+from carillon.fem.finite_cells.build import covering, finite_cells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
 from carillon.fem.model import fine_model, mass_properties
@@ -22,6 +22,7 @@ from solver.assembly.sparse import assembled
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from tests import solids
+from tests.cut_solids import divided
 
 STEEL, BRASS = (named_material(name).region(name) for name in ("steel", "brass"))
 KINDS = ("voxel", "finite-cell")
@@ -301,7 +302,7 @@ def test_modes_files_keep_regions_and_supports(kind, tmp_path, run_cli):
     assert run_cli("solver", "audit", out).returncode == 0
 
 
-@pytest.mark.parametrize("name", ["border_cell", "border_region", "cell", "octant", "region"])
+@pytest.mark.parametrize("name", ["border_cell", "border_region", "portion", "region"])
 @pytest.mark.parametrize("number", [-1, 1_000_000])
 def test_shared_cells_that_name_what_is_not_there_are_refused(name, number, tmp_path):
     import h5py
@@ -312,13 +313,13 @@ def test_shared_cells_that_name_what_is_not_there_are_refused(name, number, tmp_
     with h5py.File(tmp_path / "solid.h5", "w") as file:
         put_regions(file, model.regions, model.region)
         put_shared(file, model.shared)
-        assert len(get_shared(file, model.cells, file).cell)
+        assert len(get_shared(file, model.cells, file, None).portion)
         values = file["shared"][name][:].astype(np.int64)
         values[0] = number
         del file["shared"][name]
         file["shared"][name] = values
         with pytest.raises(UserError, match="that are not there"):
-            get_shared(file, model.cells, file)
+            get_shared(file, model.cells, file, None)
 
 
 def test_uniform_solids_are_written_as_ever(tmp_path, run_cli):
@@ -343,3 +344,21 @@ def test_regions_of_one_material_give_the_spectrum_of_solids_without():
     other = solid([(STEEL, Everywhere()), (STEEL, OBLIQUE)])
     one, two = (solids.analysed(each, modes=20, tolerance=1e-8).values for each in (plain, other))
     assert np.allclose(one[6:], two[6:], rtol=1e-7)
+
+
+@pytest.mark.parametrize("shares", [(), (0.5,)], ids=["whole", "divided"])
+@pytest.mark.parametrize("resolution", [12, 20, 21])
+def test_regions_have_their_volumes_where_the_surface_cuts_cells(resolution, shares):
+    """A bar with an arch, half of it by a plane that follows no lattice."""
+    surface = builtin_surface("bar")
+    points = np.random.default_rng(0).uniform(*surface.bounds, (200_000, 3))
+    points = points[surface.contains(points)]
+    share = (points @ [1.0, 0.3, 0.0] > 0.02).mean()
+    cells = divided(covering(surface, resolution), shares)
+    regions = [(STEEL, Everywhere()), (BRASS, Expression("x + 0.3 * y > 0.02"))]
+    placed = composed(regions, surface).of_cells(cells)
+    young = placed.regions.moduli(placed.region)
+    model = finite_cell_model(cells, young, placed.regions, placed.region, placed.shared)
+    found = (model.density - STEEL.density[0]) / (BRASS.density[0] - STEEL.density[0])
+    assert found == pytest.approx(share, abs=2e-3)
+    assert (np.linalg.eigvalsh(model.nodal_mass())[:, 0] > 0.0).all()

@@ -29,6 +29,7 @@ def truth(tmp_path_factory, run_cli) -> Path:
 def test_ranks_factorise_together(ranks, mpiexec):
     names = [
         "all_ranks_factorise",
+        "all_ranks_factorise_through_cells_of_several_sizes",
         "a_rank_that_fails_to_factorise_ends_all",
         "a_warm_start_takes_the_inverse_of_the_material_before",
     ]

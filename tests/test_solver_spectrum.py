@@ -72,14 +72,15 @@ def test_all_modes_kept_equal_the_full_solve(interface, subdomains, lumped):
 
 
 def test_element_restricted_to_its_nodes_relaxes_or_holds_the_others():
-    element = fine_model(solids.box_mesh(1, 1, 1), np.array([1e9])).stiffness()
+    elements = fine_model(solids.box_mesh(1, 1, 1), np.array([1e9])).elements
+    element, places = elements.stiffness(), elements.node_places
     everything = np.ones((1, 8), dtype=bool)
     for interface in ("free", "fixed"):
-        assert np.allclose(restrict_stiffness(element, everything, interface), element)
+        assert np.allclose(restrict_stiffness(element, everything, interface, places), element)
     for code in range(1, 255):
         inside = np.array([[code >> corner & 1 for corner in range(8)]], dtype=bool)
-        relaxed = restrict_stiffness(element, inside, "free")[0]
-        held = restrict_stiffness(element, inside, "fixed")[0]
+        relaxed = restrict_stiffness(element, inside, "free", places)[0]
+        held = restrict_stiffness(element, inside, "fixed", places)[0]
         scale = np.abs(element).max()
         assert la.eigvalsh(relaxed)[0] > -1e-12 * scale
         assert la.eigvalsh(held - relaxed)[0] > -1e-12 * scale

@@ -136,7 +136,8 @@ def test_the_command_writes_the_modes_of_an_octahedron(words, tmp_path, capfd):
     summary = json.loads(output.out)
     assert "solid_frequency_error_rms" in summary and "warning" not in output.err
     if words:
-        np.testing.assert_allclose(summary["frequencies_hz"][6:9], 2865.6, rtol=2e-4)
+        # With 32 spacings it is 2864.1 Hz.
+        np.testing.assert_allclose(summary["frequencies_hz"][6:9], 2864.2, rtol=2e-4)
 
 
 def test_no_shift_lies_beyond_a_crowd_of_the_wanted_eigenvalues():

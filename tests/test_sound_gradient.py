@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
+from carillon.fem.finite_cells.build import covering
 from carillon.fem.geometry import hexmesh_from_grid
 from solver.analysis.problem import ProblemOptions
 from solver.assembly.sparse import assembled
@@ -159,12 +160,15 @@ def test_poissons_ratio_stays_between_its_bounds_and_has_a_slope():
         assert free.slope(poisson) == pytest.approx(difference)
 
 
+@pytest.mark.parametrize("divisions", [(), (0.3, 0.1)], ids=["whole", "divided"])
 @pytest.mark.parametrize("free", [NOTHING, free_poisson(0.0, 0.45)])
-def test_gradient_through_finite_cells(free):
+def test_gradient_through_finite_cells(free, divisions):
     """The stiffness is linear in the moduli, so that there is no kink anywhere."""
     sides = (0.08, 0.06, 0.03)
     surface = cut_solids.turned(cut_solids.box(*sides))
-    cells = cut_solids.spaced(surface, EDGE)
+    resolution = round(float(np.ptp(surface.bounds, axis=0).max()) / EDGE)
+    cells = cut_solids.divided(covering(surface, resolution), divisions)
+    assert cells.levels.max() == len(divisions) and (cells.kinds > 0).any() == bool(divisions)
     struck = [Strike("a", 0, surface.vertices[1], -surface.vertex_normals[1])]
     struck.append(Strike("b", 1, surface.vertices[6], -surface.vertex_normals[6]))
     material = ReducedMaterial.of_mesh(cells.mesh, SIZE, 1e9, "exponential", free)

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import eigsh
 
 from carillon.composition.places import Expression
 from carillon.composition.supports import Support, placed_supports
-from carillon.errors import UserError
+from carillon.errors import ConvergenceError, UserError
 from carillon.fem.finite_cells.build import finite_cells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import hexmesh_from_voxels, voxelize
@@ -147,6 +147,11 @@ def test_a_pad_is_stiffer_across_than_along():
 @pytest.mark.parametrize("kind", KINDS)
 def test_all_methods_find_the_modes_of_held_solids(kind, method):
     model = bar(kind, Support("end", END), resolution=24)
+    if (kind, method) == ("finite-cell", "lobpcg"):
+        # Multigrid hardly converges where cells are nearly empty, and says so.
+        with pytest.raises(ConvergenceError, match="use --method lanczos"):
+            solids.analysed(model, modes=12, method=method, tolerance=1e-8)
+        return
     found = solids.analysed(model, modes=12, method=method, tolerance=1e-8).values
     assert np.allclose(np.sqrt(found) / (2.0 * np.pi), hertz(model, 12), rtol=1e-6)
 

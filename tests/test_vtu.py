@@ -8,13 +8,14 @@ import pytest
 
 import carillon as ca
 from carillon.command_line.exit_status import EXIT_BAD_INPUT
-from carillon.fem.geometry import CORNER_OFFSETS
+from carillon.fem.finite_cells.build import covering
+from carillon.fem.geometry import CORNER_OFFSETS, builtin_surface
 from carillon.files.vtu import HEXAHEDRON_CORNERS
 from solver.__main__ import main
 from solver.exchange.displayed import DENSITY, YOUNG, displayed
+from solver.response.points import voxel_motion
 from tests import solids
-from tests.cut_solids import uniform
-from tests.test_divided_cells import divided
+from tests.cut_solids import divided, uniform
 from tests.test_refinement import mixed_model
 
 
@@ -35,8 +36,8 @@ def _models():
     yield "voxels", solids.random_box(3, 2, 2)
     yield "coarse", solids.bar_models()[2]
     yield from ((f"mixed {seed}", mixed_model(seed)[1]) for seed in range(3))
-    yield from ((f"divided {name}", uniform(divided(name, 12)[1].cells)) for name in ("bell",))
-    yield "whole", uniform(divided("fork", 12)[0])
+    yield "divided", uniform(divided(covering(builtin_surface("bell"), 12), (0.3, 0.1)))
+    yield "whole", uniform(covering(builtin_surface("fork"), 12).cells)
 
 
 MODELS = list(_models())
@@ -55,7 +56,7 @@ def test_cubes_are_the_elements_where_they_are(model):
     assert shown.data[DENSITY] @ volumes == pytest.approx(model.mass, rel=1e-9)
     gradient = np.random.default_rng(0).standard_normal((3, 3))
     np.testing.assert_allclose(
-        shown.vectors(mesh.nodes @ gradient), shown.points @ gradient, atol=1e-12
+        shown.vectors(model.positions @ gradient), shown.points @ gradient, atol=1e-12
     )
 
 
@@ -75,7 +76,8 @@ def test_meshio_reads_what_the_modes_file_holds(files, name, tmp_path):
     np.testing.assert_array_equal(grid.field_data["residuals"], solution.residuals)
     assert len(grid.point_data) == 8
     for number, values in enumerate(grid.point_data.values()):
-        np.testing.assert_array_equal(values, solution.shapes[number])
+        moved = voxel_motion(solution.solid, solution.shapes[number].ravel()).reshape(-1, 3)
+        np.testing.assert_allclose(values, moved, rtol=1e-12)
     young = solution.solid.young.reshape(solution.mesh.n_cells, -1).mean(axis=1)
     np.testing.assert_allclose(grid.cell_data[YOUNG][0], young)
     assert (grid.cell_data[DENSITY][0] <= 7850.0 * (1.0 + 1e-9)).all()
@@ -132,7 +134,7 @@ def test_a_surface_moves_with_the_solid(files, tmp_path, name):
     )
     assert areas.sum() == pytest.approx(bar.surface.area)
     # Rigid motions are linear in the place, and those of the nodes are those of the surface.
-    shape, nodes = solution.shapes[0], solution.mesh.nodes
+    shape, nodes = solution.shapes[0], solution.solid.positions
     linear = np.linalg.lstsq(np.column_stack([nodes, np.ones(len(nodes))]), shape, rcond=None)[0]
     found = next(iter(grid.point_data.values()))
     expected = np.column_stack([grid.points, np.ones(len(grid.points))]) @ linear

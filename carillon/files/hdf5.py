@@ -67,6 +67,17 @@ class _Disk(io.FileIO):
                 super().truncate(end)
         self.seek(end)
 
+    def readinto(self, buffer: Any) -> int:
+        """Read, zeros where a hole could not be left."""
+        view = memoryview(buffer).cast("B")
+        begin = self.tell()
+        done = super().readinto(view) or 0
+        if self.failure is not None and done < len(view):
+            view[done:] = bytes(len(view) - done)
+            done = len(view)
+            self.seek(begin + done)
+        return done
+
     def truncate(self, size: int | None = None) -> int:
         """Set the length, or remember why that failed."""
         try:

@@ -1,6 +1,7 @@
 """Stiffness and mass of a solid in files of other programs."""
 
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -79,8 +80,11 @@ def _petsc(path: Path, matrix: sp.csr_matrix, _: str) -> None:
 
 
 def _npz(path: Path, matrix: sp.csr_matrix, _: str) -> None:
+    # An archive that cannot be closed, on a full disk, would say so when it is collected.
+    archive = BytesIO()
+    sp.save_npz(archive, matrix)
     with open(path, "wb") as stream:
-        sp.save_npz(stream, matrix)
+        stream.write(archive.getbuffer())
 
 
 WRITERS: dict[str, Callable[[Path, sp.csr_matrix, str], None]] = {
