@@ -4,6 +4,7 @@ Both packages are optional, since nothing but this comparison needs them.
 """
 
 import time
+from collections.abc import Callable
 from importlib import import_module, metadata
 from typing import Any
 
@@ -66,18 +67,15 @@ def tetrahedra(solid: ReferenceSolid, spacing: float, kind: str, modes: int) -> 
     points, elements = mesh(solid, order * spacing, order)
     meshed = time.perf_counter()
     K, M = matrices(points, elements)
-    values = lowest(K, M, modes, solid)
+    values = lowest(K, M, modes, max(solid.sides))
     solved = time.perf_counter()
     return Spectrum(values, spacing, K.shape[0], meshed - begin, solved - meshed)
 
 
 def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, Index]:
     """Points (n, 3) [m] and elements (m, 4 or 10) of a solid with edges of about `size` [m]."""
-    import gmsh
 
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
+    def draw(gmsh: Any) -> None:
         x, y, z = solid.sides
         shapes = gmsh.model.occ
         if solid.shape == "box":
@@ -88,18 +86,43 @@ def mesh(solid: ReferenceSolid, size: float, order: int) -> tuple[Array, Index]:
             else:
                 body = shapes.addCylinder(0, 0, -0.5, 0, 0, 1, 0.5)
             shapes.dilate([(3, body)], 0, 0, 0, x, y, z)
-        shapes.synchronize()
+
+    return gmsh_elements(draw, size, order, GMSH_TETRAHEDRON[order])
+
+
+def gmsh_elements(
+    draw: Callable[[Any], None], size: float, order: int, kind: int, dimension: int = 3
+) -> tuple[Array, Index]:
+    """Points (n, 3) [m] and elements (m, k) that Gmsh makes of what `draw` describes.
+
+    Parameters
+    ----------
+    draw
+        Makes a model by the shapes ``gmsh.model.occ``; it may set options and fields of sizes.
+    size
+        Edges of the elements [m], if `draw` sets nothing else.
+    order, kind
+        Degree of the elements' sides, and Gmsh's number for the elements.
+    """
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
         for limit in ("Min", "Max"):
             gmsh.option.setNumber(f"Mesh.MeshSize{limit}", size)
-        gmsh.model.mesh.generate(3)
+        draw(gmsh)
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(dimension)
         gmsh.model.mesh.setOrder(order)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, nodes = gmsh.model.mesh.getElementsByType(GMSH_TETRAHEDRON[order])
+        _, nodes = gmsh.model.mesh.getElementsByType(kind)
+        corners = gmsh.model.mesh.getElementProperties(kind)[3]
     finally:
         gmsh.finalize()
     number = np.full(int(tags.max()) + 1, -1)
     number[tags.astype(np.int64)] = np.arange(len(tags))
-    elements = number[nodes.astype(np.int64)].reshape(-1, 4 if order == 1 else 10)
+    elements = number[nodes.astype(np.int64)].reshape(-1, corners)
     used = np.unique(elements)
     place = np.full(len(tags), -1)
     place[used] = np.arange(len(used))
@@ -146,10 +169,13 @@ def _curved(straight: Any, points: Array, elements: Index) -> Any:
     return replace(curved, doflocs=places)
 
 
-def lowest(K: sp.csr_matrix, M: sp.csr_matrix, modes: int, solid: ReferenceSolid) -> Array:
-    """Lowest eigenvalues by Krylov-Schur in shift-and-invert mode with a sparse Cholesky."""
-    # Of the slowest wave along the longest side.
-    guess = YOUNG / DENSITY / max(solid.sides) ** 2
+def lowest(K: sp.csr_matrix, M: sp.csr_matrix, modes: int, longest: float) -> Array:
+    """Lowest eigenvalues by Krylov-Schur in shift-and-invert mode with a sparse Cholesky.
+
+    `longest` is the longest side [m] of the solid.
+    """
+    # Of the slowest wave along it.
+    guess = YOUNG / DENSITY / longest**2
     stiffness, weight = (distributed_matrix(matrix, MPI.COMM_SELF) for matrix in (K, M))
     solver = SLEPc.EPS().create(MPI.COMM_SELF)
     try:
