@@ -227,20 +227,28 @@ LISTS = {
     "missed_tolerance": "solver.analysis.options:MISSED",
     "rivals": "studies.benchmark.further_rivals:RIVALS",
     "quantity": "studies.objectives.goals:LABELS",
-    "solids": "studies.accuracy.solids:SOLIDS",
+    "accuracy.solids": "studies.accuracy.solids:SOLIDS",
+    "thin_walls.solids": "studies.thin_walls.solids:SOLIDS",
 }
-"""Where the code holds the choices of a key, by the name of the key."""
+"""Where the code holds the choices of a key, by its place or its name."""
+
+
+def held_choices(place: str) -> str | None:
+    place = place.rstrip("[]")
+    return LISTS.get(place, LISTS.get(place.rpartition(".")[2]))
+
+
 CHOICES = [
     (place, domain.choices)
     for place, domain in every_value()
-    if domain.choices and place.rpartition(".")[2].rstrip("[]") in LISTS
+    if domain.choices and held_choices(place)
 ]
 
 
 @pytest.mark.parametrize(("place", "choices"), CHOICES, ids=str)
 def test_every_list_of_choices_is_that_of_the_code(place, choices):
     """They are written out where the code that has them takes long to load."""
-    module, _, attribute = LISTS[place.rpartition(".")[2].rstrip("[]")].partition(":")
+    module, _, attribute = str(held_choices(place)).partition(":")
     held = getattr(import_module(module), attribute)
     assert sorted(set(choices) - {"all"}) == sorted(held), place
 
