@@ -4,6 +4,7 @@ import json
 import os
 import select
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -18,6 +19,8 @@ from carillon.processes.slurm_job import job_and_node
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
 EXIT_INTERRUPTED = 130
+LONGEST_WAIT = 10.0
+"""Seconds that a rank waits for the others that raise an error of all ranks."""
 REPORT = "CARILLON_ERRORS"
 """Environment variable with the name of a file, to which programs append their errors.
 
@@ -70,8 +73,14 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
             say(said)
             report(said)
     _drop_unwritten()
-    if comm is not None and comm.size > 1 and not collective:
-        comm.Abort(status)
+    if comm is not None and comm.size > 1:
+        if collective:
+            # The first rank that ends has the others killed, maybe before the sentence is out.
+            everyone, last = comm.Ibarrier(), time.monotonic() + LONGEST_WAIT
+            while not everyone.Test() and time.monotonic() < last:
+                time.sleep(0.01)
+        else:
+            comm.Abort(status)
     return status
 
 
