@@ -109,8 +109,8 @@ Resolution = Annotated[
 Discretisation = Annotated[
     str,
     OneOf("voxel", "finite-cell"),
-    "cubes that are full or empty (voxel), or quadratic cells of twice their edge of which only "
-    "what is inside counts (finite-cell)",
+    "cubes that are full or empty (voxel), or cells of degree 4 and of four times their edge of "
+    "which only what is inside counts (finite-cell)",
 ]
 MetresPerUnit = Annotated[float, between(*UNITS), "metres per unit of the mesh's coordinates [m]"]
 Fill = Annotated[str, OneOf("winding", "centre", "orthographic"), "which voxels the surface fills"]

@@ -117,8 +117,8 @@ class ModelEntry(SolidEntry):
     resolution: Resolution = option(REQUIRED)
     discretisation: Discretisation = option(
         "voxel",
-        "either voxel, cubes that are full or empty, or finite-cell, quadratic cells of which only "
-        "what is inside counts, which are not coarsened",
+        "either voxel, cubes that are full or empty, or finite-cell, cells of degree 4 of which "
+        "only what is inside counts, which are not coarsened",
     )
     wall: WallThickness | None = option(None)
     wall_side: WallSide = option("about")

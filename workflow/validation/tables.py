@@ -44,8 +44,8 @@ def criteria(evidence: Evidence) -> list[Row]:
 )
 def solid(evidence: Evidence) -> Iterator[Row]:
     """Expected distance of the fine mesh's frequencies from those of the solid itself. Voxels are
-    compared with quadratic finite cells on the same lattice; the error of these follows from what
-    modes would lose if cells were larger. Positive: too high."""
+    compared with finite cells on the same lattice; the error of these follows from what modes
+    would gain if cells had more functions. Positive: too high."""
     settings, distance = evidence.settings, evidence.distance
     row = {
         "discretisation": settings["discretisation"],
