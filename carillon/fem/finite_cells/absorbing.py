@@ -22,7 +22,7 @@ FARTHEST = 3
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What cells have of voxels, all of whose arrays have a row for each, ordered by cell."""
+    """Portions of voxels that are inside cells: (e,) of them, ordered by cell."""
 
     cell: Index
     """(e,)."""

@@ -40,7 +40,7 @@ class FiniteCells:
     """
 
     degree: int
-    """Of the shape functions, see `carillon.fem.finite_cells.basis`."""
+    """Polynomial degree of the shape functions, see `carillon.fem.finite_cells.basis`."""
     nodes: NDArray[np.int32]
     """(c, n) nodes of each cell, in the order of its basis."""
     corner: NDArray[np.int32]
@@ -247,7 +247,7 @@ def surface_points(cells: FiniteCells, voxels: NDArray[np.integer], outward: Arr
 
 
 def merged(cells: FiniteCells) -> FiniteCells:
-    """The same cells, of which those with the same nodes are one."""
+    """One cell in place of all cells that have the same nodes; it has the voxels of each."""
     same, first, number = np.unique(cells.nodes, axis=0, return_index=True, return_inverse=True)
     if len(same) == len(cells):
         return cells

@@ -154,7 +154,7 @@ def cover_of(inside: Inside, basis: Basis, level: int = 0) -> LatticeCover:
 def _table(
     basis: Basis, count: int, found: Portions, among_all: Index, full_parts: Index
 ) -> tuple[Index, Index, Index, Array]:
-    """What all parts have of voxels: `part`, `voxel`, `row` and `weights` of `LatticeCover`."""
+    """Arrays `part`, `voxel`, `row` and `weights` of `LatticeCover`: a row a voxel in a part."""
     whole = basis.line_voxels(count)
     kept = found.weights.sum(axis=1) >= SMALLEST_PORTION / count**3
     part, voxel, weights = among_all[found.part[kept]], found.voxel[kept], found.weights[kept]

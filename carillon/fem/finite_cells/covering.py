@@ -203,7 +203,7 @@ class CellParts:
     faces: Faces
     """Where they meet."""
     step: float
-    """Of finest nodes, in voxels."""
+    """Distance between neighbouring nodes of the finest lattice [voxel edges]."""
 
     @classmethod
     def of_levels(
@@ -213,7 +213,7 @@ class CellParts:
         undivided: Sequence[Flags],
         voxels: Sequence[Index],
     ) -> CellParts:
-        """Those of lattices, each of half the edge of the one before.
+        """Join the parts of several lattices, whose cells have half the edge of the one before.
 
         `undivided` (c,) cells of each are not replaced by those of the next. See
         `Covering._voxels_in` for the `voxels` of each.

@@ -36,7 +36,7 @@ def kinds_of_cells(octant: Index, hangs: Flags) -> NDArray[np.int32]:
 
 
 def complete(hangs: Flags) -> Flags:
-    """What hangs (c, 12), with the outer edges of faces that do, but without their other edges."""
+    """Faces and edges of cells that hang (c, 12): hanging faces hang their outer edges only."""
     result = np.zeros((len(hangs), COLUMNS), dtype=bool)
     result[:, : hangs.shape[1]] = hangs
     for axis in range(3):

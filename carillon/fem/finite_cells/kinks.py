@@ -58,7 +58,7 @@ class Borders:
         return len(self.cell)
 
     def some(self, chosen: Flags, region: NDArray[np.integer]) -> Borders:
-        """Those chosen (k,), with other numbers (k, 2) of their regions."""
+        """Borders that are `chosen` (k,), between the regions of new numbers `region` (k, 2)."""
         arrays = (getattr(self, name)[chosen] for name in ("cell", "place", "normal", "share"))
         cell, place, normal, share = arrays
         return Borders(cell, region[chosen].astype(np.uint16), place, normal, share)
