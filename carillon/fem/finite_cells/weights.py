@@ -126,6 +126,7 @@ def _integrate(  # type: ignore[no-untyped-def]
     n, boxes, size = lines_b.shape[1], BOXES, len(primitive)
     b, c = (axis + 1) % 3, (axis + 2) % 3
     stride = np.array([1, size, size * size])
+    steps = stride[b], stride[c], stride[axis]
     along, sums = np.empty(size), np.zeros((size, size))
     at, local = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for k in range(len(cells)):
@@ -165,14 +166,7 @@ def _integrate(  # type: ignore[no-untyped-def]
                         to = own[k, number_in, part]
                         if to != current:
                             if current >= 0:
-                                _add(
-                                    weights[current],
-                                    sums,
-                                    lines_b[voxel_b, i],
-                                    stride[b],
-                                    stride[c],
-                                    stride[axis],
-                                )
+                                _add(weights[current], sums, lines_b[voxel_b, i], steps)
                             sums[:] = 0.0
                             current = to
                         for mc in range(size):
@@ -180,19 +174,13 @@ def _integrate(  # type: ignore[no-untyped-def]
                             for ma in range(size):
                                 sums[mc, ma] += factor * along[ma]
                 if current >= 0:
-                    _add(
-                        weights[current],
-                        sums,
-                        lines_b[voxel_b, i],
-                        stride[b],
-                        stride[c],
-                        stride[axis],
-                    )
+                    _add(weights[current], sums, lines_b[voxel_b, i], steps)
 
 
 @numba.njit(cache=True, nogil=True)
-def _add(weights, sums, factors, step_b, step_c, step_a):  # type: ignore[no-untyped-def]
+def _add(weights, sums, factors, steps):  # type: ignore[no-untyped-def]
     size = len(sums)
+    step_b, step_c, step_a = steps
     for mb in range(size):
         for mc in range(size):
             place = step_b * mb + step_c * mc
