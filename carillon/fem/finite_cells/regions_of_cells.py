@@ -6,6 +6,8 @@ bisection.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +30,9 @@ SAMPLES = (0.02, 0.5, 0.98)
 ROUNDING = 1e-12
 """Share of a whole cell's energy that a part's may be negative by."""
 LEAST_MIXED = 4.0**-12
-"""Least share of a cell's regions that is mixed where a part's energy is negative."""
+"""Least share of a voxel's regions that is mixed where a part's energy is negative."""
+PARTS_AT_ONCE = 1024
+"""Parts whose energies are computed together: 20 MB."""
 FLAT = 1e-6
 """Least extent of the points of a border across each other, in cells, for a plane through them."""
 
@@ -49,7 +53,8 @@ def regions_of_cells(
         some = boxes.some(split)
         axes = _axes_across(seen[split])
         found = parts_of_boxes(some, axes, regions_at, inside)
-        parts = _complete(found, some.weights, seen[split])
+        exact = some.weights
+        parts = _made_definite(cells, _complete(found, exact, seen[split]), exact)
     # A voxel is of the region that most of it is of, in all cells that have some of it.
     whole = np.ones(len(region), dtype=bool)
     whole[split] = False
@@ -144,7 +149,6 @@ def _with_borders(
     """
     ones = np.ones(cells.mesh.n_cells), np.ones(len(shared.portion))
     inside, law = point_values(cells, region, shared, *ones, 0.0)
-    shared = _made_definite(cells, shared, inside, law)
     if law.shape[1] < 2:
         return shared
     volume = inside.sum(axis=2)
@@ -174,47 +178,36 @@ def _with_borders(
     return SharedCells(shared.portion, shared.region, shared.weights, borders)
 
 
-def _made_definite(
-    cells: FiniteCells, shared: SharedCells, inside: Array, law: RegionOf
-) -> SharedCells:
-    """What cells share, with regions mixed in a cell by as little as makes energies positive.
+def _made_definite(cells: FiniteCells, parts: BoxParts, exact: Array) -> BoxParts:
+    """The parts, those of a box mixed by as little as makes the energy of each positive.
 
     What lines miss of a box is in its parts by their volumes, and may be negative somewhere. Mixing
-    leaves each region its volume, and all together what they are. See `point_values` for the
-    weights `inside` (c, s, d) and the regions `law` (c, s).
+    leaves each part its volume, and all together the weights `exact` (k, d) of boxes.
     """
-    own, first = np.unique(cells.cell[shared.portion], return_index=True)
-    if not len(own):
-        return shared
-    inside, law = inside[own], law[own]
-    total = inside.sum(axis=1)
-    volume = inside.sum(axis=2) / total.sum(axis=1)[:, None]
-    mixed = volume[:, :, None] * total[:, None] - inside
-    share = np.zeros(len(own))
-    left, step = np.arange(len(own)), LEAST_MIXED
-    while True:
-        now = inside[left] + share[left, None, None] * mixed[left]
-        left = left[_least_energies(cells, now).min(axis=1) < -ROUNDING]
-        if not len(left) or step > 1.0:
+    volume = parts.weights.sum(axis=1) / exact.sum(axis=1)[parts.box]
+    mixed = volume[:, None] * exact[parts.box] - parts.weights
+    weights = parts.weights.copy()
+    left, share = np.arange(len(weights)), LEAST_MIXED
+    while share <= 1.0:
+        negative = left[_least_energies(cells, weights[left]) < -ROUNDING]
+        if not len(negative):
             break
-        share[left], step = step, 4.0 * step
-    cell, slot = np.nonzero((share[:, None] > 0.0) & (volume > 0.0))
-    return SharedCells(
-        np.append(shared.portion, shared.portion[first][cell]),
-        np.concatenate([shared.region, law[cell, slot]]),
-        np.concatenate([shared.weights, share[cell, None] * mixed[cell, slot]]),
-        shared.borders,
-    )
+        # All parts of a box together.
+        left = np.flatnonzero(np.isin(parts.box, parts.box[negative]))
+        weights[left] = parts.weights[left] + share * mixed[left]
+        share *= 4.0
+    return replace(parts, weights=weights)
 
 
-def _least_energies(cells: FiniteCells, inside: Array) -> Array:
-    """Least eigenvalues (c, s) of the masses of parts with weights (c, s, d), by a whole cell's."""
-    whole = nodal_mass(cells.degree, cells.basis.whole[None])[0]
-    inverse = np.linalg.inv(np.linalg.cholesky(whole))
-    grams = nodal_mass(cells.degree, inside.reshape(-1, cells.basis.n_points))
-    return np.asarray(
-        np.linalg.eigvalsh(inverse @ grams @ inverse.T)[:, 0].reshape(inside.shape[:2])
-    )
+def _least_energies(cells: FiniteCells, weights: Array) -> Array:
+    """Least eigenvalue (e,) of the mass of each part with weights (e, d), by a whole cell's."""
+    degree, found = cells.degree, np.empty(len(weights))
+    inverse = np.linalg.inv(np.linalg.cholesky(nodal_mass(degree, cells.basis.whole[None])[0]))
+    for first in range(0, len(weights), PARTS_AT_ONCE):
+        few = slice(first, first + PARTS_AT_ONCE)
+        grams = inverse @ nodal_mass(degree, weights[few]) @ inverse.T
+        found[few] = np.linalg.eigvalsh(grams)[:, 0]
+    return found
 
 
 def _fit_planes(
