@@ -23,9 +23,8 @@ STEPS = 8
 """Intervals of a line across a voxel, at whose ends regions are compared."""
 BISECTIONS, BISECTIONS_OF_SURFACE = 24, 7
 """Bisections for a border of regions, and for the solid's surface, whose volume is known."""
-GROUPS, GROUPS_CUT = 2, 1
-"""Groups of four Gauss points, in which the lines across a voxel lie, along each of its edges; of
-voxels that the surface cuts, whose weights are known together."""
+GROUPS = 2
+"""Groups of four Gauss points, in which the lines across a voxel lie, along each of its edges."""
 AT_ONCE = 500_000
 """Points whose regions are found at once."""
 PIECES_AT_ONCE = 8192
@@ -102,22 +101,18 @@ class BoxParts:
 def parts_of_boxes(boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> BoxParts:
     """Parts of boxes that lines across them along `axis` (k,) find."""
     found = []
-    for groups, chosen in ((GROUPS, ~boxes.is_cut), (GROUPS_CUT, boxes.is_cut)):
-        own = np.flatnonzero(chosen)
-        # A few boxes at a time, each with all of its lines.
-        step = max(1, AT_ONCE // (len(_across(groups)[0]) * (STEPS + 1)))
-        for first in range(0, len(own), step):
-            few = own[first : first + step]
-            parts = _parts(boxes.some(few), axis[few], regions_at, inside, groups)
-            rows = few[parts.box], parts.region, parts.weights
-            found.append((*rows, few[parts.border_box], parts.border))
+    # A few boxes at a time, each with all of its lines.
+    step = max(1, AT_ONCE // (len(_across()[0]) * (STEPS + 1)))
+    for first in range(0, len(axis), step):
+        few = np.arange(first, min(first + step, len(axis)))
+        parts = _parts(boxes.some(few), axis[few], regions_at, inside)
+        rows = few[parts.box], parts.region, parts.weights
+        found.append((*rows, few[parts.border_box], parts.border))
     return BoxParts(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
-def _parts(
-    boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt, groups: int
-) -> BoxParts:
-    places, shares = _across(groups)
+def _parts(boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> BoxParts:
+    places, shares = _across()
     lines = _Lines(boxes, axis, places, regions_at, inside)
     (line, low, high, region), (crossing, at) = _pieces(lines, len(axis) * len(places))
     box, number = np.divmod(line, len(places))
@@ -218,12 +213,12 @@ def _pieces(lines: _Lines, count: int) -> tuple[Pieces, tuple[Index, Array]]:
     return (line[kept], begin[kept], end[kept], of[kept]), crossings
 
 
-def _across(groups: int) -> tuple[Array, Array]:
+def _across() -> tuple[Array, Array]:
     """Places (l, 2) of the lines across a voxel, and their shares of it (l,)."""
     nodes, shares = np.polynomial.legendre.leggauss(4)
-    starts = np.arange(groups) / groups
-    place = (starts[:, None] + (nodes + 1.0) / (2.0 * groups)).ravel()
-    share = np.tile(shares / (2.0 * groups), groups)
+    starts = np.arange(GROUPS) / GROUPS
+    place = (starts[:, None] + (nodes + 1.0) / (2.0 * GROUPS)).ravel()
+    share = np.tile(shares / (2.0 * GROUPS), GROUPS)
     first, second = np.meshgrid(place, place, indexing="ij")
     return np.stack([first.ravel(), second.ravel()], axis=1), np.outer(share, share).ravel()
 

@@ -28,7 +28,7 @@ from carillon.fem.regions import RegionOf
 SAMPLES = (0.02, 0.5, 0.98)
 """Places along a box's edge at which regions are looked for."""
 ROUNDING = 1e-12
-"""Share of a whole cell's energy that a part's may be negative by."""
+"""Share of a whole cell's energy, times the part's volume, that a part's may be negative by."""
 LEAST_MIXED = 4.0**-12
 """Least share of a voxel's regions that is mixed where a part's energy is negative."""
 PARTS_AT_ONCE = 1024
@@ -200,13 +200,14 @@ def _made_definite(cells: FiniteCells, parts: BoxParts, exact: Array) -> BoxPart
 
 
 def _least_energies(cells: FiniteCells, weights: Array) -> Array:
-    """Least eigenvalue (e,) of the mass of each part with weights (e, d), by a whole cell's."""
+    """Least eigenvalue (e,) of the mass of each part with weights (e, d), by a whole cell's, over
+    the part's volume."""
     degree, found = cells.degree, np.empty(len(weights))
     inverse = np.linalg.inv(np.linalg.cholesky(nodal_mass(degree, cells.basis.whole[None])[0]))
     for first in range(0, len(weights), PARTS_AT_ONCE):
         few = slice(first, first + PARTS_AT_ONCE)
         grams = inverse @ nodal_mass(degree, weights[few]) @ inverse.T
-        found[few] = np.linalg.eigvalsh(grams)[:, 0]
+        found[few] = np.linalg.eigvalsh(grams)[:, 0] / weights[few].sum(axis=1)
     return found
 
 
