@@ -17,7 +17,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel
 from solver.accuracy.estimate import HALVED, CellErrors, estimate_cell_errors
 from solver.analysis.modes import Modes
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional
-from solver.refinement.errors import DIVIDED_CELLS, RefinementStep
+from solver.refinement.errors import DIVIDED_CELLS, ExpectedErrors, RefinementStep
 from solver.refinement.estimate import MODES_USED
 
 REMAINING = 0.7
@@ -32,6 +32,8 @@ OF_DIVISION = 150
 """About the number of unknowns that a cell adds where it is divided."""
 MOST_STEPS = 5
 """Largest number of rounds in which cells are divided."""
+MOST_RAISED = 2.0
+"""Largest factor by which expected errors are raised where divisions gained more than expected."""
 
 
 class DividedCells:
@@ -48,6 +50,7 @@ class DividedCells:
         self._placed_on = placed_on or (lambda cells: alike)
         self._divisions: list[Index] = [np.empty((0, 3), dtype=np.int64)] * MOST_LEVELS
         self._steps = 0
+        self._before: tuple[Array, Array] | None = None
 
     @property
     def count(self) -> int:
@@ -61,12 +64,28 @@ class DividedCells:
         many of them would have to be divided.
         """
         estimate = estimate_cell_errors(self.model, values, modes)
-        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, self.count, estimate.errors)
-        above = estimate.errors.excess(tolerance)
+        errors = self._raised(values, estimate.errors)
+        step = RefinementStep(self.model.n_dofs, DIVIDED_CELLS, self.count, errors)
+        above = errors.excess(tolerance)
         if above <= 1.0 or self._steps == MOST_STEPS:
             return step, True
         chosen = self._chosen(estimate, REMAINING / above)
         return step, not (len(chosen) and self._divide(chosen))
+
+    def _raised(self, values: Array, expected: ExpectedErrors) -> ExpectedErrors:
+        """Expected errors, raised as far as the last division gained more than was expected of it.
+
+        Where walls meet at sharp edges that is up to twice as much.
+        """
+        errors, before = expected.errors, self._before
+        elastic = values[expected.rigid :][: len(errors)]
+        self._before = elastic, errors
+        if before is None or len(before[0]) != len(elastic):
+            return expected
+        fallen = np.sqrt(np.maximum(before[0] / elastic, 0.0)) - 1.0
+        foretold = (1.0 + before[1]) / (1.0 + errors) - 1.0
+        ratio = float(np.linalg.norm(fallen) / np.linalg.norm(foretold))
+        return replace(expected, errors=np.clip(ratio, 1.0, MOST_RAISED) * errors)
 
     def _chosen(self, estimate: CellErrors, left: float) -> Index:
         """Cells (d,) to divide so that of the error a share is `left`, or of the worst."""
@@ -75,22 +94,37 @@ class DividedCells:
         order = np.argsort(-gains, kind="stable")
         part = np.clip((1.0 - left) / (1.0 - 1.0 / HALVED), LEAST, MOST)
         count = 1 + int(np.searchsorted(np.cumsum(gains[order]), part * estimate.shares.sum()))
-        room = max(LARGEST, MOST_GROWTH * self._undivided.n_dofs) - self.model.n_dofs
+        room = self._most_unknowns - self.model.n_dofs
         order = order[: min(count, max(int(room / OF_DIVISION), 0))]
         return np.asarray(order[gains[order] > 0.0])
 
+    @property
+    def _most_unknowns(self) -> float:
+        return max(LARGEST, MOST_GROWTH * self._undivided.n_dofs)
+
     def _divide(self, chosen: Index) -> bool:
-        """Divide more cells (d,), and whether that was possible."""
-        cells, divisions = self.model.cells, list(self._divisions)
+        """Divide more cells (d,), those with the largest errors first, and whether there was room.
+
+        Others are divided with them, since no neighbour is more than twice as large.
+        """
+        cells = self.model.cells
         levels, places = cells.levels[chosen], cells.corner[chosen] // cells.span[chosen, None]
-        for level in range(MOST_LEVELS):
-            both = np.concatenate([divisions[level], places[levels == level]])
-            divisions[level] = np.unique(both.astype(np.int64), axis=0)
-        divisions = balanced(divisions, self._covering.shape)
-        try:
-            divided = self._covering.divided(divisions)
-        except UserError as error:
-            say(f"no more cells are divided: {error}")
+        while len(places):
+            divisions = list(self._divisions)
+            for level in range(MOST_LEVELS):
+                both = np.concatenate([divisions[level], places[levels == level]])
+                divisions[level] = np.unique(both.astype(np.int64), axis=0)
+            divisions = balanced(divisions, self._covering.shape)
+            try:
+                divided = self._covering.divided(divisions)
+            except UserError as error:
+                say(f"no more cells are divided: {error}")
+                return False
+            if 3 * divided.n_nodes <= self._most_unknowns:
+                break
+            half = len(places) // 2
+            levels, places = levels[:half], places[:half]
+        else:
             return False
         self._divisions = divisions
         placed = self._placed_on(divided)
