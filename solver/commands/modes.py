@@ -128,7 +128,7 @@ def _options(
     solid, solver = collect(ProblemOptions, given), collect(SolverOptions, given)
     is_told = distance.estimate is not False and (solver.is_general or solver.is_corrected)
     refine_to = collect(RefinementOptions, given).tolerance(
-        solid.coarsen, solid.discretisation, is_told
+        solid.coarsen, solid.discretisation, is_told, distance.accuracy
     )
     initial = arguments.initial_modes
     if arguments.refine:

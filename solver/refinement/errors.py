@@ -106,23 +106,27 @@ class RefinementOptions:
         None,
         "keep blocks fine, or divide finite cells, until the expected error of the frequencies of "
         "modes 7 to 60 is at most so large: its root mean square, and a third of the worst "
-        f"(default {ALLOWED_ERROR:g} with --coarsen {FOREST}, {ALLOWED_DISTANCE:g} with "
-        "--discretisation finite-cell; 0 refines nothing)",
+        f"(default {ALLOWED_ERROR:g} with --coarsen {FOREST}; that of --accuracy, or "
+        f"{ALLOWED_DISTANCE:g}, with --discretisation finite-cell; 0 refines nothing)",
         metavar="ERROR",
     )
 
     def tolerance(
-        self, coarsen: str, discretisation: str = "voxel", estimated: bool = True
+        self,
+        coarsen: str,
+        discretisation: str = "voxel",
+        estimated: bool = True,
+        accuracy: float | None = None,
     ) -> float | None:
         """The allowed error; None if nothing is to be refined.
 
-        Finite cells are refined by the estimate of their distance from the solid, and left as they
-        are if that is not `estimated` and nothing was given. Raises UserError if it was given and
-        there is nothing to refine.
+        Finite cells are refined by the estimate of their distance from the solid, down to the
+        `accuracy` if one is asked for, and left as they are if the distance is not `estimated` and
+        nothing was given. Raises UserError if it was given and there is nothing to refine.
         """
         if discretisation == "finite-cell":
             if self.refine_to is None:
-                return ALLOWED_DISTANCE if estimated else None
+                return (accuracy or ALLOWED_DISTANCE) if estimated else None
             return self.refine_to or None
         if coarsen == "none":
             if self.refine_to is not None:

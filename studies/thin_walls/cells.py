@@ -89,7 +89,7 @@ def cell_spectrum(
     """
     described = ProblemOptions(mesh, resolution, discretisation="finite-cell", unit=unit)
     options = SolverOptions(modes=MODES)
-    tolerance = RefinementOptions(refine_to).tolerance("none", "finite-cell")
+    tolerance = RefinementOptions(refine_to).tolerance("none", "finite-cell", accuracy=accuracy)
     request = AccuracyRequest(accuracy, tolerance, estimated=True)
     begin = time.perf_counter()
     solve = SolveByOptions(options, MPI.COMM_SELF)

@@ -20,7 +20,9 @@ class ThinWallsSection:
         32, "lattice spacings along the longest side, at first [1]"
     )
     accuracy: Annotated[float, Ge(0.0), Le(1.0)] = option(
-        0.01, "expected error down to which resolutions are raised; 0 leaves them [1]"
+        0.01,
+        "expected error down to which resolutions are raised, of thick solids a fifth of it; "
+        "0 leaves them [1]",
     )
     levels: Annotated[int, Ge(0), Le(4)] = option(
         3, "sizes of each discretisation, coarsest first; 0 leaves out errors over size [1]"

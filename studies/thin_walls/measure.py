@@ -32,7 +32,9 @@ class ThinWallOptions:
         32, "lattice spacings along the longest side, at first"
     )
     accuracy: Annotated[float, between(0.0, 1.0)] = option(
-        0.01, "expected error down to which resolutions are raised; 0 leaves them"
+        0.01,
+        "expected error down to which resolutions are raised, of thick solids a fifth of it; "
+        "0 leaves them",
     )
     levels: Annotated[int, between(0, LEVELS)] = option(
         3, "sizes of each discretisation, coarsest first; 0 leaves out errors over size"
@@ -54,11 +56,17 @@ def measure_thin_walls(
     without = missing() if options.levels else ""
     # What is compiled or loaded when it is first used is not timed.
     cell_spectrum("builtin:box", 1.0, 8)
-    resolution, accuracy = options.resolution, options.accuracy or None
+    resolution = options.resolution
     places = [(name, position) for name in solids for position in (STRAIGHT, TURNED)]
     found = [
         {"solid": name, "position": position}
-        | tried_cells(solids[name], position, references.get(name), resolution, accuracy)
+        | tried_cells(
+            solids[name],
+            position,
+            references.get(name),
+            resolution,
+            accuracy_for(solids[name].kind, options.accuracy),
+        )
         for name, position in track(places, "solids")
     ]
     levels = [
@@ -85,6 +93,17 @@ def measure_thin_walls(
         "without": without,
         "packages": {} if without or not options.levels else versions(),
     }
+
+
+def accuracy_for(kind: str, accuracy: float) -> float | None:
+    """Accuracy that solids of a kind are asked for, in proportion to their aims; None of 0.
+
+    Examples
+    --------
+    >>> accuracy_for("thin", 0.01), accuracy_for("thick", 0.01), accuracy_for("file", 0.0)
+    (0.01, 0.002, None)
+    """
+    return accuracy * AIMS[kind][0] / AIMS["thin"][0] or None
 
 
 def facets(solid: WalledSolid, resolution: int) -> dict[str, Any] | None:
