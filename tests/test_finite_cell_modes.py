@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from carillon.errors import UserError
+from carillon.fem.element import rigid_motions
 from carillon.fem.finite_cells.build import covering, finite_cells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import builtin_surface
@@ -16,11 +17,13 @@ from solver.accuracy.divide import DividedCells
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem
+from solver.assembly.sparse import assembled
 from solver.files.modes_file import read_modes, write_modes
 from solver.hcms.condense import INTERFACES
 from solver.refinement.errors import ALLOWED_DISTANCE
 from solver.response.points import interpolation
 from solver.verification.comparison import compare_files
+from solver.verification.fitted import fitted
 from studies.accuracy import domains
 from studies.accuracy.ritz import free_eigenvalues
 from studies.accuracy.solids import SOLIDS
@@ -153,6 +156,22 @@ def test_modes_of_voxels_are_told_on_finite_cells_and_back(tmp_path):
         matched = compared.matched
         assert (matched["modes"], matched["moved"]) == (6, 0) and matched["overlap_median"] > 0.99
         assert abs(matched["worst"]) == compared.frequency_max_relative_error_7_60
+
+
+@pytest.mark.parametrize("levels", range(5))
+def test_modes_are_told_on_cells_divided_any_number_of_times(levels):
+    cover = covering(builtin_surface("frying-pan"), 16)
+    divided = uniform(cut_solids.divided(cover, (0.2,) * levels))
+    whole = uniform(cover.cells)
+    modes = solids.analysed(whole, modes=12, method="slepc")
+    found = modes.system.gather(modes.vectors)
+    still = rigid_motions(whole.positions, np.zeros(3))
+    told = fitted(divided, whole, np.concatenate([found, still], axis=1))
+    mass = assembled(divided)[1]
+    norms = np.einsum("ik,ik->k", told, mass @ told)
+    assert norms[:12] == pytest.approx(1.0, rel=2e-3)
+    moved = rigid_motions(divided.positions, np.zeros(3))
+    assert norms[12:] == pytest.approx(np.einsum("ik,ik->k", moved, mass @ moved), rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -194,8 +194,8 @@ class FiniteCells:
         return np.array_equal(self.node_grid[self.nodes], places) and bool((self.shares > 0).all())
 
 
-def middles_of_voxels(cells: FiniteCells) -> tuple[Array, Array]:
-    """Middles (m, 3) [m] of what is inside each voxel, and its covariances (m, 3, 3) [m^2]."""
+def middles_of_portions(cells: FiniteCells) -> tuple[Array, Array]:
+    """Middles (e, 3) [m] of what cells have of voxels, and its covariances (e, 3, 3) [m^2]."""
     points = cells.basis.points
     edge = cells.edges[cells.cell]
     local = (cells.weights @ points)[cells.row] / cells.shares[:, None]
@@ -203,8 +203,13 @@ def middles_of_voxels(cells: FiniteCells) -> tuple[Array, Array]:
     second = ((cells.weights @ squares)[cells.row] / cells.shares[:, None]).reshape(-1, 3, 3)
     spread = second - local[:, :, None] * local[:, None, :]
     middle = cells.origin + cells.step * cells.corner[cells.cell] + edge[:, None] * local
-    spread = (edge**2)[:, None, None] * spread
-    volume = cells.shares * edge**3
+    return middle, (edge**2)[:, None, None] * spread
+
+
+def middles_of_voxels(cells: FiniteCells) -> tuple[Array, Array]:
+    """Middles (m, 3) [m] of what is inside each voxel, and its covariances (m, 3, 3) [m^2]."""
+    middle, spread = middles_of_portions(cells)
+    volume = cells.shares * cells.edges[cells.cell] ** 3
     count = cells.mesh.n_cells
     total = np.bincount(cells.voxel, volume, minlength=count)
     empty = total == 0.0  # slivers that finer lines miss
