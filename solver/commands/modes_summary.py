@@ -11,7 +11,14 @@ from solver.accuracy.solving import AccuracyRequest, Solved
 from solver.analysis.options import SolverOptions
 from solver.analysis.phases import ByRank
 from solver.files.modes_file import ESTIMATE, FINE_TAKEN, frequencies
-from solver.refinement.errors import DIVIDED_CELLS, FINE_BLOCKS, FROM_FINE, FROM_SOLID, in_words
+from solver.refinement.errors import (
+    DIVIDED_CELLS,
+    FINE_BLOCKS,
+    FROM_FINE,
+    FROM_SOLID,
+    WORST,
+    in_words,
+)
 
 REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
 """Words for what is counted as refined."""
@@ -111,9 +118,11 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
         if f"{prefix}_rms" in attributes:
             print(f"expected {words} {in_words(attributes, prefix)}{counts}")
     if "missed_accuracy" in attributes:
+        rms = 100.0 * attributes["missed_accuracy"]
         print(
-            f"{100 * attributes['missed_accuracy']:g}% rms was aimed at, which dividing some cells "
-            "does not reach: raise --resolution"
+            f"{rms:g}% rms and {WORST * rms:g}% at worst were asked for, which dividing "
+            f"cells up to {attributes['n_dofs']:,} unknowns does not reach: raise --resolution, or "
+            "give --accuracy, which does"
         )
 
 

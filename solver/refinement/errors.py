@@ -12,7 +12,6 @@ from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from solver.coarsening.forest import FOREST
 
-"""Number of the first mode whose error is estimated."""
 LAST = 60
 """Number of the last mode whose error is estimated."""
 FROM_FINE, FROM_SOLID = "expected_frequency_error", "solid_frequency_error"
@@ -92,10 +91,25 @@ class RefinementStep:
 def in_words(attributes: dict[str, Any], prefix: str) -> str:
     """A sentence's end about errors that a file's attributes tell."""
     first, last = attributes[f"{prefix}_modes"]
+    rms, worst = attributes[f"{prefix}_rms"], attributes[f"{prefix}_worst"]
     return (
-        f"of frequencies {first} to {last}: {attributes[f'{prefix}_rms']:.1%} rms, worst "
-        f"{attributes[f'{prefix}_worst']:+.1%} (mode {attributes[f'{prefix}_worst_mode']})"
+        f"of frequencies {first} to {last}: {_percent(rms)} rms, worst "
+        f"{'+' if worst >= 0.0 else '-'}{_percent(abs(worst))} "
+        f"(mode {attributes[f'{prefix}_worst_mode']})"
     )
+
+
+def _percent(share: float) -> str:
+    """A share in percent with two digits that count, or one after the point.
+
+    Examples
+    --------
+    >>> [_percent(share) for share in (0.1234, 0.0123, 0.00123, 0.000123, 0.0)]
+    ['12.3%', '1.2%', '0.12%', '0.012%', '0.0%']
+    """
+    percent = 100.0 * share
+    digits = 1 if percent >= 1.0 or percent < 1e-6 else int(1 - np.floor(np.log10(percent)))
+    return f"{percent:.{digits}f}%"
 
 
 @parameters

@@ -20,6 +20,12 @@ AIMS = {"thin": (0.01, 0.03), "thick": (0.002, 0.006), "file": (0.01, 0.03)}
 """Aims of the root mean square error and of the worst, by kind of solid."""
 MOST_UNKNOWNS = 60_000
 """Aim of the unknowns that this takes."""
+LEGEND = (
+    "at: resolution in the end; rms, worst: errors of the frequencies; expected: rms error that "
+    "is told;\nlowest: least ratio of a frequency to the reference; cells by level: undivided, "
+    "divided once, and so on"
+)
+"""What the columns of the text are."""
 FACETS = "ring"
 """Solid whose surface is also made of twice as many sections."""
 
@@ -129,18 +135,21 @@ def as_text(result: dict[str, Any]) -> str:
     """The result in columns."""
     lines = [
         f"{result['elastic_modes']} elastic frequencies of finite cells at resolution "
-        f"{result['resolution']} and more, for an expected error of {result['accuracy']:g}",
+        f"{result['resolution']} and more, for an expected error of {result['accuracy']:g}, of "
+        f"thick solids {accuracy_for('thick', result['accuracy']) or 0:g}",
         f"{'':<24}{'':<9}{'unknowns':>9}{'at':>5}{'seconds':>9}{'rms':>8}{'worst':>9}"
         f"{'expected':>9}{'lowest':>9}  cells by level",
     ]
     lines += [_line(result, found) for found in result["solids"]]
+    lines.append(LEGEND)
     if result["summary"]:
         lines += ["", f"{'at equal unknowns, in equal time':<46}{'rate':>6}{'rms':>23}{'rms':>23}"]
     lines += [_summary_line(result, row) for row in result["summary"]]
     if result["facets"]:
         lines += [
             "",
-            "{title}: twice {sections} sections change {change:.1e}".format_map(result["facets"]),
+            "{title}: twice {sections} sections of its surface change frequencies by {change:.1e} "
+            "at most".format_map(result["facets"]),
         ]
     return "\n".join([*lines, *([result["without"]] if result["without"] else [])])
 
