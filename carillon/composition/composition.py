@@ -121,7 +121,8 @@ class Composition:
         """
         if self._is_one:
             return PlacedRegions(self.regions)
-        region, shared, nowhere = regions_of_cells(cells, self.placement.at, self._surface.contains)
+        materials, inside = self._materials(), self._surface.contains
+        region, shared, nowhere = regions_of_cells(cells, self.placement.at, inside, materials)
         middles, _ = middles_of_voxels(cells)
         found = np.where(nowhere, -1, region.astype(np.int64))
         found = self._without_holes(found, middles, cells.mesh.edge)
@@ -155,6 +156,18 @@ class Composition:
             borders = shared.borders.some((sides >= 0).all(axis=1), sides)
             shared = replace(shared, region=numbers, borders=borders)
         return PlacedRegions(regions, region, shared)
+
+    def _materials(self) -> Index:
+        """Number (r,) of each region's material: that of the first region of the same one."""
+        known: dict[tuple[object, ...], int] = {}
+        numbers = []
+        for index, part in enumerate(self._parts):
+            row = _turned(part)
+            key: tuple[object, ...] = (index,)
+            if not callable(part.axes):
+                key = row.elasticity[0].tobytes(), float(row.young[0]), float(row.density[0])
+            numbers.append(known.setdefault(key, index))
+        return np.array(numbers)
 
     def _turned_by_place(self, number: Index, places: Array) -> tuple[Regions, Index, Index]:
         """The table, the row (p,) of each place, and that of each part, -1 where axes vary."""

@@ -33,7 +33,7 @@ AT_ONCE = 16
 """Cells whose kinks are computed together; each takes 2 megabytes."""
 SMALLEST = 1e-4
 """Share of a cell's inside below which the smaller part has no kink."""
-SOFTEST = 1e-10
+SOFTEST = 1e-7
 """Share of the kinks' largest stiffness that is added, for those that hardly strain anything."""
 ALIKE = 1e-7
 """Energy, over the largest, below which polynomials are the same inside a cell: what is taken off

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,9 +40,12 @@ class Boxes:
     portion: Index
     """(k,) which of the parts that cells have of voxels are in them."""
 
-    def some(self, chosen: Index) -> Boxes:
+    groups = GROUPS
+    """Groups of lines along each edge."""
+
+    def some(self, chosen: Index) -> Self:
         """A few of them."""
-        return Boxes(self.cells, self.portion[chosen])
+        return replace(self, portion=self.portion[chosen])
 
     @property
     def weights(self) -> Array:
@@ -61,22 +65,27 @@ class Boxes:
 
     @cached_property
     def frames(self) -> tuple[Array, Array]:
-        """Lowest corners (k, 3) and edges (k,) [m]."""
+        """Lowest corners (k, 3) and edges (k, 3, 3) [m], in columns."""
         cells, (low, edge) = self.cells, self.local
         cell = cells.cell[self.portion]
         corner = cells.origin + cells.step * cells.corner[cell]
-        return corner + cells.edges[cell, None] * low, cells.edges[cell] * edge
+        edges = (cells.edges[cell] * edge)[:, None, None] * np.eye(3)
+        return corner + cells.edges[cell, None] * low, edges
 
     def sampled(self, offsets: Array, function: Callable[[Array], NDArray]) -> NDArray[np.int64]:  # type: ignore[type-arg]
         """Values (k, p) of a function at places `offsets` (p, 3) in them, from 0 to 1."""
-        corner, edge = self.frames
+        corner, edges = self.frames
         found = np.empty((len(corner), len(offsets)), dtype=np.int64)
         step = max(1, AT_ONCE // len(offsets))
         for first in range(0, len(corner), step):
             few = slice(first, first + step)
-            places = corner[few, None] + edge[few, None, None] * offsets
+            places = corner[few, None] + offsets @ edges[few].transpose(0, 2, 1)
             found[few] = function(places.reshape(-1, 3)).reshape(places.shape[:2])
         return found
+
+    def integrals(self, pieces: LocalPieces, group: Index, count: int) -> Array:
+        """Integrals (count, d) of the points' Lagrange polynomials over pieces, by `group` (p,)."""
+        return _integrals(self.cells.basis, self.local, pieces, group, count)
 
 
 @dataclass(frozen=True)
@@ -97,29 +106,34 @@ class BoxParts:
         none = np.empty(0, dtype=np.int64)
         return cls(none, none, np.empty((0, points)), none, np.empty((0, 3)))
 
+    @classmethod
+    def joined(cls, found: Sequence[BoxParts]) -> BoxParts:
+        """All parts of several."""
+        names = ("box", "region", "weights", "border_box", "border")
+        return cls(*(np.concatenate([getattr(each, name) for each in found]) for name in names))
+
 
 def parts_of_boxes(boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> BoxParts:
     """Parts of boxes that lines across them along `axis` (k,) find."""
     found = []
     # A few boxes at a time, each with all of its lines.
-    step = max(1, AT_ONCE // (len(_across()[0]) * (STEPS + 1)))
+    step = max(1, AT_ONCE // (len(_across(boxes.groups)[0]) * (STEPS + 1)))
     for first in range(0, len(axis), step):
         few = np.arange(first, min(first + step, len(axis)))
         parts = _parts(boxes.some(few), axis[few], regions_at, inside)
-        rows = few[parts.box], parts.region, parts.weights
-        found.append((*rows, few[parts.border_box], parts.border))
-    return BoxParts(*(np.concatenate(each) for each in zip(*found, strict=True)))
+        found.append(replace(parts, box=few[parts.box], border_box=few[parts.border_box]))
+    return BoxParts.joined(found)
 
 
 def _parts(boxes: Boxes, axis: Index, regions_at: RegionsAt, inside: InsideAt) -> BoxParts:
-    places, shares = _across()
+    places, shares = _across(boxes.groups)
     lines = _Lines(boxes, axis, places, regions_at, inside)
     (line, low, high, region), (crossing, at) = _pieces(lines, len(axis) * len(places))
     box, number = np.divmod(line, len(places))
     pairs = np.stack([box, region], axis=1)
     key, where = np.unique(pairs, axis=0, return_inverse=True)
-    pieces = _LocalPieces(box, axis[box], places[number], low, high, shares[number])
-    summed = _integrals(boxes.cells.basis, boxes.local, pieces, where.ravel(), len(key))
+    pieces = LocalPieces(box, axis[box], places[number], low, high, shares[number])
+    summed = boxes.integrals(pieces, where.ravel(), len(key))
     border = lines.points(crossing, at)
     return BoxParts(key[:, 0], key[:, 1], summed, crossing // len(places), border)
 
@@ -141,8 +155,8 @@ class _Lines:
         turned = (self.axis[box, None] + np.arange(3)) % 3
         both = np.concatenate([along[:, None], self.places[number]], axis=1)
         np.put_along_axis(local, turned, both, axis=1)
-        corner, edge = self.boxes.frames
-        return np.asarray(corner[box] + edge[box, None] * local)
+        corner, edges = self.boxes.frames
+        return np.asarray(corner[box] + np.einsum("pij,pj->pi", edges[box], local))
 
     def are_cut(self, line: Index) -> Flags:
         """Which lines (p,) are in boxes that the surface cuts."""
@@ -213,18 +227,18 @@ def _pieces(lines: _Lines, count: int) -> tuple[Pieces, tuple[Index, Array]]:
     return (line[kept], begin[kept], end[kept], of[kept]), crossings
 
 
-def _across() -> tuple[Array, Array]:
+def _across(groups: int) -> tuple[Array, Array]:
     """Places (l, 2) of the lines across a voxel, and their shares of it (l,)."""
     nodes, shares = np.polynomial.legendre.leggauss(4)
-    starts = np.arange(GROUPS) / GROUPS
-    place = (starts[:, None] + (nodes + 1.0) / (2.0 * GROUPS)).ravel()
-    share = np.tile(shares / (2.0 * GROUPS), GROUPS)
+    starts = np.arange(groups) / groups
+    place = (starts[:, None] + (nodes + 1.0) / (2.0 * groups)).ravel()
+    share = np.tile(shares / (2.0 * groups), groups)
     first, second = np.meshgrid(place, place, indexing="ij")
     return np.stack([first.ravel(), second.ravel()], axis=1), np.outer(share, share).ravel()
 
 
 @dataclass(frozen=True)
-class _LocalPieces:
+class LocalPieces:
     """Pieces of lines in boxes, from 0 to 1 there."""
 
     box: Index
@@ -237,7 +251,7 @@ class _LocalPieces:
 
 
 def _integrals(
-    basis: Basis, local: tuple[Array, Array], pieces: _LocalPieces, group: Index, count: int
+    basis: Basis, local: tuple[Array, Array], pieces: LocalPieces, group: Index, count: int
 ) -> Array:
     """Integrals (count, d) of the points' Lagrange polynomials over pieces, by their `group` (p,).
 

@@ -23,14 +23,18 @@ from carillon.fem.finite_cells.region_lines import (
     parts_of_boxes,
 )
 from carillon.fem.finite_cells.shared_cells import SharedCells, point_values
+from carillon.fem.finite_cells.slabs import Slabs, straight_bodies
 from carillon.fem.regions import RegionOf
 
 SAMPLES = (0.02, 0.5, 0.98)
 """Places along a box's edge at which regions are looked for."""
+SAMPLED = np.array([[x, y, z] for z in SAMPLES for y in SAMPLES for x in SAMPLES])
+"""(27, 3) in a box."""
+THIN = 0.5
+"""Edges of a voxel below which what it holds is thin: samples, and lines that run along it, would
+miss it."""
 ROUNDING = 1e-12
 """Share of a whole cell's energy, times the part's volume, that a part's may be negative by."""
-LEAST_MIXED = 4.0**-12
-"""Least share of a voxel's regions that is mixed where a part's energy is negative."""
 PARTS_AT_ONCE = 1024
 """Parts whose energies are computed together: 20 MB."""
 FLAT = 1e-6
@@ -38,23 +42,32 @@ FLAT = 1e-6
 
 
 def regions_of_cells(
-    cells: FiniteCells, regions_at: RegionsAt, inside: InsideAt
+    cells: FiniteCells, regions_at: RegionsAt, inside: InsideAt, materials: Index
 ) -> tuple[RegionOf, SharedCells, Flags]:
     """Region (m,) that most of each voxel is of, what several share, and which (m,) are of none.
 
-    `inside` tells whether points (p, 3) [m] are inside the solid's surface.
+    `inside` tells whether points (p, 3) [m] are inside the solid's surface, `materials` (r,) which
+    regions are of one material: their numbers are the same.
     """
     boxes = Boxes(cells, np.arange(len(cells.cell)))
     seen = _seen(boxes, regions_at, inside)
+    bodies = straight_bodies(cells)
+    thickness = np.linalg.norm(bodies[1], axis=1).min(axis=1)
+    thin = thickness < THIN * cells.edges[cells.cell] * boxes.local[1]
+    slabs = Slabs(cells, np.arange(len(cells.cell)), bodies)
+    seen[thin] = slabs.some(np.flatnonzero(thin)).sampled(SAMPLED, regions_at)
     region = seen.max(axis=1)
     split = np.flatnonzero(_varies(seen))
     parts = BoxParts.nothing(cells.basis.n_points)
     if len(split):
-        some = boxes.some(split)
-        axes = _axes_across(seen[split])
-        found = parts_of_boxes(some, axes, regions_at, inside)
-        exact = some.weights
-        parts = _made_definite(cells, _complete(found, exact, seen[split]), exact)
+        found = BoxParts.joined(
+            [
+                _parts_of(kind, split, chosen, seen, regions_at, inside)
+                for kind, chosen in ((boxes, ~thin[split]), (slabs, thin[split]))
+            ]
+        )
+        exact = boxes.some(split).weights
+        parts = _complete(cells, found, exact, seen[split], materials)
     # A voxel is of the region that most of it is of, in all cells that have some of it.
     whole = np.ones(len(region), dtype=bool)
     whole[split] = False
@@ -85,16 +98,32 @@ def regions_of_cells(
 
 def _seen(boxes: Boxes, regions_at: RegionsAt, inside: InsideAt) -> NDArray[np.int64]:
     """Regions (k, 27) at samples of boxes; -1 where there is none, or outside the solid."""
-    offsets = np.array([[x, y, z] for z in SAMPLES for y in SAMPLES for x in SAMPLES])
-    seen = boxes.sampled(offsets, regions_at)
+    seen = boxes.sampled(SAMPLED, regions_at)
     cut = np.flatnonzero(boxes.is_cut)
     mixed = cut[_varies(seen[cut])]
     if len(mixed):
-        is_inside = boxes.some(mixed).sampled(offsets, inside).astype(bool)
+        is_inside = boxes.some(mixed).sampled(SAMPLED, inside).astype(bool)
         left = np.where(is_inside, seen[mixed], -1)
         # Too thin for the samples: all of them count.
         seen[mixed] = np.where((left < 0).all(axis=1, keepdims=True), seen[mixed], left)
     return seen
+
+
+def _parts_of(
+    boxes: Boxes,
+    split: Index,
+    chosen: Flags,
+    seen: NDArray[np.int64],
+    regions_at: RegionsAt,
+    inside: InsideAt,
+) -> BoxParts:
+    """Parts by region of those `chosen` (k,) of the boxes `split` (k,); see `_seen`."""
+    rows = np.flatnonzero(chosen)
+    if not len(rows):
+        return BoxParts.nothing(boxes.cells.basis.n_points)
+    own = split[rows]
+    parts = parts_of_boxes(boxes.some(own), _axes_across(seen[own]), regions_at, inside)
+    return replace(parts, box=rows[parts.box], border_box=rows[parts.border_box])
 
 
 def _varies(seen: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -109,24 +138,48 @@ def _most(row: NDArray[np.int64]) -> int:
     return int(np.bincount(there).argmax()) if len(there) else -1
 
 
-def _complete(parts: BoxParts, exact: Array, seen: NDArray[np.int64]) -> BoxParts:
+def _complete(
+    cells: FiniteCells, parts: BoxParts, exact: Array, seen: NDArray[np.int64], materials: Index
+) -> BoxParts:
     """The parts with what lines miss of the weights (k, d) of boxes, in proportion to them.
 
-    That is what boxes have taken in from slight neighbours, and rounding. Boxes that lines find
-    nothing of are of the commonest sample's region.
+    That is what boxes have taken in from slight neighbours, and rounding. Where a part would have
+    negative energy somewhere, and another is of another material, those of the box are as lines
+    find them, with the box's volume. Boxes that lines find nothing of are of the commonest sample's
+    region.
     """
-    row, region, weights = parts.box, parts.region, parts.weights
-    found = np.zeros_like(exact)
-    np.add.at(found, row, weights)
-    total = np.bincount(row, weights.sum(axis=1), minlength=len(exact))
-    share = weights.sum(axis=1) / np.where(total > 0.0, total, 1.0)[row]
-    weights = weights + share[:, None] * (exact - found)[row]
+    row, region, found = parts.box, parts.region, parts.weights
+    summed = np.zeros_like(exact)
+    np.add.at(summed, row, found)
+    total = np.bincount(row, found.sum(axis=1), minlength=len(exact))
+    share = found.sum(axis=1) / np.where(total > 0.0, total, 1.0)[row]
+    weights = found + share[:, None] * (exact - summed)[row]
+    negative = np.zeros(len(exact), dtype=bool)
+    negative[row[_least_energies(cells, weights) < -ROUNDING]] = True
+    least, most = np.full(len(exact), len(materials)), np.zeros(len(exact), dtype=np.int64)
+    np.minimum.at(least, row, materials[region])
+    np.maximum.at(most, row, materials[region])
+    negative &= least < most
+    scale = exact.sum(axis=1) / np.where(total > 0.0, total, 1.0)
+    weights = np.where(negative[row, None], scale[row, None] * found, weights)
     missed = np.flatnonzero(total == 0.0)
     if len(missed):  # slivers between the lines
-        most = [_most(samples) for samples in seen[missed]]
-        row, region = np.append(row, missed), np.append(region, most)
+        commonest = [_most(samples) for samples in seen[missed]]
+        row, region = np.append(row, missed), np.append(region, commonest)
         weights = np.concatenate([weights, exact[missed]])
     return BoxParts(row, region, weights, parts.border_box, parts.border)
+
+
+def _least_energies(cells: FiniteCells, weights: Array) -> Array:
+    """Least eigenvalue (e,) of the mass of each part with weights (e, d), by a whole cell's, over
+    the part's volume."""
+    degree, found = cells.degree, np.empty(len(weights))
+    inverse = np.linalg.inv(np.linalg.cholesky(nodal_mass(degree, cells.basis.whole[None])[0]))
+    for first in range(0, len(weights), PARTS_AT_ONCE):
+        few = slice(first, first + PARTS_AT_ONCE)
+        grams = inverse @ nodal_mass(degree, weights[few]) @ inverse.T
+        found[few] = np.linalg.eigvalsh(grams)[:, 0] / weights[few].sum(axis=1)
+    return found
 
 
 def _axes_across(seen: NDArray[np.int64]) -> Index:
@@ -176,39 +229,6 @@ def _with_borders(
         both / both.sum(axis=1, keepdims=True),
     )
     return SharedCells(shared.portion, shared.region, shared.weights, borders)
-
-
-def _made_definite(cells: FiniteCells, parts: BoxParts, exact: Array) -> BoxParts:
-    """The parts, those of a box mixed by as little as makes the energy of each positive.
-
-    What lines miss of a box is in its parts by their volumes, and may be negative somewhere. Mixing
-    leaves each part its volume, and all together the weights `exact` (k, d) of boxes.
-    """
-    volume = parts.weights.sum(axis=1) / exact.sum(axis=1)[parts.box]
-    mixed = volume[:, None] * exact[parts.box] - parts.weights
-    weights = parts.weights.copy()
-    left, share = np.arange(len(weights)), LEAST_MIXED
-    while share <= 1.0:
-        negative = left[_least_energies(cells, weights[left]) < -ROUNDING]
-        if not len(negative):
-            break
-        # All parts of a box together.
-        left = np.flatnonzero(np.isin(parts.box, parts.box[negative]))
-        weights[left] = parts.weights[left] + share * mixed[left]
-        share *= 4.0
-    return replace(parts, weights=weights)
-
-
-def _least_energies(cells: FiniteCells, weights: Array) -> Array:
-    """Least eigenvalue (e,) of the mass of each part with weights (e, d), by a whole cell's, over
-    the part's volume."""
-    degree, found = cells.degree, np.empty(len(weights))
-    inverse = np.linalg.inv(np.linalg.cholesky(nodal_mass(degree, cells.basis.whole[None])[0]))
-    for first in range(0, len(weights), PARTS_AT_ONCE):
-        few = slice(first, first + PARTS_AT_ONCE)
-        grams = inverse @ nodal_mass(degree, weights[few]) @ inverse.T
-        found[few] = np.linalg.eigvalsh(grams)[:, 0] / weights[few].sum(axis=1)
-    return found
 
 
 def _fit_planes(
