@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from carillon.composition.materials import named_material
+from carillon.composition.places import Everywhere, Expression
 from carillon.errors import UserError
 from carillon.fem.finite_cells.build import covering, finite_cells
 from carillon.fem.finite_cells.covering import Covering
@@ -17,8 +19,9 @@ from solver.files.modes_file import read_modes
 from studies.accuracy.solids import SOLIDS
 from studies.thin_walls.references import read_references
 from tests import cut_solids, solids
-from tests.cut_solids import spaced, uniform
+from tests.cut_solids import box, spaced, uniform
 from tests.rank_counts import TO_THREE
+from tests.test_regions import solid
 
 CELLS = ["--discretisation", "finite-cell"]
 
@@ -68,6 +71,30 @@ def test_errors_at_joints_are_told_by_what_a_division_gained():
     true = np.sqrt(np.mean((np.sqrt(values[6:]) / (2.0 * np.pi * exact) - 1.0) ** 2))
     assert alone.rms < true / 1.5
     assert true / 1.5 < errors.rms < 1.5 * true
+
+
+@pytest.mark.parametrize("resolution", [8, 16])
+def test_errors_are_told_of_regions_of_one_material(resolution):
+    block, steel = box(0.24, 0.16, 0.12), named_material("steel").region("steel")
+    parts = [(steel, Everywhere()), (steel, Expression("z > 0.013"))]
+    model = solid(parts, "finite-cell", block, resolution)
+    alone = solid(parts[:1], "finite-cell", block, resolution)
+    rms = [estimate_cell_errors(each, *solved(each, 14)).errors.rms for each in (model, alone)]
+    assert rms[0] == pytest.approx(rms[1], rel=1e-6)
+
+
+def test_errors_of_cells_of_several_materials_are_those_of_the_others_or_not_told():
+    block, names = box(0.24, 0.16, 0.12), ("steel", "aluminium")
+    steel, aluminium = (named_material(name).region(name) for name in names)
+    parts = [(steel, Everywhere()), (aluminium, Expression("z > 0.013"))]
+    model = solid(parts, "finite-cell", block, 8)
+    with pytest.raises(UserError, match="have 100% of the strain energy"):
+        estimate_cell_errors(model, *solved(model, 14))
+    coarse, fine = (solid(parts, "finite-cell", block, each) for each in (16, 32))
+    values, modes = solved(coarse, 14)
+    true = np.sqrt(values[6:] / solved(fine, 14)[0][6:]) - 1.0
+    expected = estimate_cell_errors(coarse, values, modes).errors.rms
+    assert 1.0 / 3.0 < expected / np.sqrt(np.mean(true**2)) < 3.0
 
 
 @pytest.mark.parametrize("most", [1.1, 1.5])

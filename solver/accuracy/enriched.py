@@ -8,7 +8,7 @@ most: those of the trunk space and, on every face, five more, (2, 3), (3, 2), (3
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,19 +44,12 @@ class Enriched:
     def residual(self, values: Array, modes: Array) -> Array:
         """What unbalanced forces (3 count, k) of modes (n_dofs, k) do on the further functions.
 
-        `values` (k,) are the modes' eigenvalues [rad^2/s^2]. Where several materials share a cell,
-        or something holds it, its functions get none.
+        `values` (k,) are the modes' eigenvalues [rad^2/s^2]. Functions of cells that are not
+        `usable` get none.
         """
-        elements, k = self.model.elements, modes.shape[1]
+        k = modes.shape[1]
         cells, nodes = self.model.cells, basis(DEGREE).n_nodes
         result = np.zeros((len(self.numbers), NEW, 3 * k))
-        usable = np.ones(len(cells), dtype=bool)
-        if elements.law is not None:
-            usable &= (elements.shares.any(axis=2).sum(axis=1) == 1) | (
-                elements.law == elements.law[:, :1]
-            ).all(axis=1)
-        if elements.support is not None:
-            usable &= elements.support < 0
         mass = _line_values(self.model, None)
         moved = modes.reshape(-1, 3 * k)
         _, functions = _tables()
@@ -73,8 +66,37 @@ class Enriched:
         padded = np.zeros((self.count + 1, 3 * k))
         np.add.at(padded, self.numbers[:, nodes:], result)
         # Also what they share with cells beside them, of which this would be half.
-        padded[self.numbers[~usable, nodes:]] = 0.0
+        padded[self.numbers[~self.usable, nodes:]] = 0.0
         return padded[:-1].reshape(3 * self.count, k)
+
+    @cached_property
+    def usable(self) -> Flags:
+        """Cells (c,) of one material that nothing holds."""
+        elements, regions = self.model.elements, self.model.regions
+        result = np.ones(len(self.numbers), dtype=bool)
+        if elements.law is not None:
+            flat = regions.elasticity.reshape(len(regions), -1)
+            rows = np.column_stack([flat, regions.density, regions.young])
+            material = np.unique(rows, axis=0, return_inverse=True)[1].ravel()[elements.law]
+            empty = ~elements.shares.any(axis=2)
+            result = (empty | (material == material[:, :1])).all(axis=1)
+        if elements.support is not None:
+            result &= elements.support < 0
+        return result
+
+    def usable_share(self, modes: Array) -> Array:
+        """Share (k,) of the strain energy of modes (n_dofs, k) that `usable` cells have."""
+        if self.usable.all():
+            return np.ones(modes.shape[1])
+        nodes, k = basis(DEGREE).n_nodes, modes.shape[1]
+        moved = modes.reshape(-1, 3 * k)
+        energy = np.zeros((len(self.numbers), k))
+        for first in range(0, len(self.numbers), CHUNK):
+            few = slice(first, first + CHUNK)
+            at = moved[self.numbers[few, :nodes]].reshape(-1, 3 * nodes, k)
+            inner = self.stiffness[few, : 3 * nodes, : 3 * nodes]
+            energy[few] = np.einsum("cik,cik->ck", at, inner @ at)
+        return np.asarray(energy[self.usable].sum(axis=0) / energy.sum(axis=0))
 
     def local(self, vectors: Array) -> Array:
         """Parts (c, 3 (n + NEW), k) of vectors (3 count, k) in cells."""

@@ -23,6 +23,8 @@ from solver.refinement.errors import LAST, ExpectedErrors
 BEYOND = 2.4
 """What an eigenvalue is expected to fall by, over what one step gains: the median of solids whose
 frequencies are known."""
+LEAST_SEEN = 0.2
+"""Share of the strain energy in cells whose errors can be told, below which none are."""
 HALVED = 8.0
 """Factor by which dividing a cell and those about it diminishes its share of the error. No measure
 of how smooth modes are in a cell foretells it better."""
@@ -42,8 +44,8 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     """Expected errors of the frequencies of finite cells against the solid's, up to mode `LAST`.
 
     `values` (k,) are eigenvalues [rad^2/s^2] and `modes` (n_dofs, k) mass-normalised, the rigid
-    ones included. Raises UserError for cells of another degree than four, and those
-    of files, which lack the moments.
+    ones included. Raises UserError for cells of another degree than four, those of files, which
+    lack the moments, and where most are of several materials or held.
 
     Examples
     --------
@@ -62,7 +64,16 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     elastic = slice(model.rigid_modes, min(LAST, len(values)))
     own = values[elastic]
     space = enriched(model)
-    gain, within = gained(space, space.residual(own, np.ascontiguousarray(modes[:, elastic])))
+    chosen = np.ascontiguousarray(modes[:, elastic])
+    gain, within = gained(space, space.residual(own, chosen))
+    # Cells of several materials, and those that are held, are taken to err as the others do.
+    seen = space.usable_share(chosen)
+    if np.median(seen) < LEAST_SEEN:
+        raise UserError(
+            f"cells of several materials, or that are held, have {1.0 - np.median(seen):.0%} of "
+            f"the strain energy, expected at most {1.0 - LEAST_SEEN:.0%}; raise --resolution"
+        )
+    gain = gain / np.maximum(seen, LEAST_SEEN)
     relative = np.sqrt(1.0 + BEYOND * gain / own) - 1.0
     shares = relative * within
     errors = ExpectedErrors(relative, model.rigid_modes)

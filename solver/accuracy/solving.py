@@ -139,7 +139,10 @@ class _Search:
         if accuracy is None:
             return None
         if f"{FROM_SOLID}_rms" not in solved.achieved:
-            raise UserError("--accuracy needs a distance from the solid, which could not be told")
+            raise UserError(
+                "--accuracy needs a distance from the solid, which could not be told; give a "
+                "higher --resolution to begin with"
+            )
         rms, worst = (solved.achieved[f"{FROM_SOLID}_{name}"] for name in ("rms", "worst"))
         excess = max(rms, abs(worst) / WORST) / accuracy
         if excess <= 1.0:
