@@ -189,6 +189,16 @@ def test_a_tube_that_the_lines_see_badly_is_told_a_resolution_that_sees_it(resol
     assert finite_cells(thin, better).volume == pytest.approx(thin.volume, rel=0.011)
 
 
+@pytest.mark.parametrize("resolution", [12, 16, 20])
+@pytest.mark.parametrize("place", [turned, lambda surface: surface], ids=["turned", "straight"])
+def test_a_needle_is_told_a_resolution_that_does(place, resolution):
+    needle = place(box(0.3, 1e-3, 1e-3))
+    with pytest.raises(UserError, match="raise the resolution to") as caught:
+        finite_cells(needle, resolution)
+    better = int(str(caught.value).split()[-1])
+    assert finite_cells(needle, better).volume == pytest.approx(needle.volume, rel=0.011)
+
+
 SHEET = trimesh.Trimesh([[0, 0, 0], [1, 0, 0.2], [0, 1, 0.7]], [[0, 1, 2]])
 
 

@@ -182,7 +182,7 @@ def _lost(surface: Surface | Wall, inside: Inside, resolution: int, grid: Grid, 
     nothing = f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
     if inside.sheet:
         return nothing
-    better = _better_resolution(surface, resolution, _holds, TRIAL_GRID)
+    better = _better_resolution(surface, resolution, _is_more_than_a_crumb, TRIAL_GRID)
     if not better and not any(len(each.low) for each in inside.pieces):
         return nothing
     remedy = f"to {better}" if better else "or make them thicker"
@@ -203,6 +203,11 @@ def _in_pieces(surface: Surface | Wall, volumes: np.ndarray, resolution: int, na
         f"mesh {name!r} at resolution {resolution} is in {len(volumes):,} pieces ({listed} voxels "
         f"the largest); {remedy}, or keep the largest alone (--components largest)"
     )
+
+
+def _is_more_than_a_crumb(inside: Inside) -> bool:
+    full = np.count_nonzero(inside.state == FULL)
+    return _holds(inside) and full + 0.5 * sum(inside.volumes()) >= SMALLEST_PIECE
 
 
 def _is_one_piece(inside: Inside) -> bool:
