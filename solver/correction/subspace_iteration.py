@@ -119,7 +119,7 @@ class SubspaceIteration:
                 raise ConvergenceError(
                     f"error correction stagnates at an eigenvalue error of {min(self.history):.1e} "
                     f"after {step} steps, {tolerance:.1e} was asked for; use another linear solver "
-                    "(--linear-solver) or a looser tolerance"
+                    "(--linear-solver), a looser tolerance or --method slepc"
                 )
             inverse = self._inverse(step, tolerance)
             try:
