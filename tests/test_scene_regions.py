@@ -300,7 +300,7 @@ class TestModes:
 
         table, modes = tmp_path / "regions.yaml", str(tmp_path / "bar.h5")
         table.write_text(self.text if text is None else text)
-        how = ["--resolution", "12", "--modes", "10", "--method", "slepc"]
+        how = ["--resolution", "12", "--modes", "10", "--method", "slepc", "--refine-to", "0"]
         how += ["--discretisation", "finite-cell", "--regions", str(table), *more]
         assert main(["modes", bar, *how, "--out", modes]) == 0
         return modes
