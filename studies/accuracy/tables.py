@@ -12,6 +12,25 @@ LABELS = {
     "linear tetrahedra": "Linear tetrahedra",
     "quadratic tetrahedra": "Quadratic tetrahedra",
 }
+SOLID = (hidden("solid", "Solid"), Column("title", "Solid"))
+MODEL = (hidden("discretisation", "Discretisation"), Column("label", "Model of"))
+SUMMARISED = (
+    *MODEL,
+    Column("rate", "Rate", "score"),
+    Column("unknowns", "At unknowns", "count"),
+    Column("error_at_unknowns", "rms error", "percent"),
+    Column("seconds", "In time", "seconds"),
+    Column("error_at_seconds", "rms error", "percent"),
+)
+"""Columns of what `studies.accuracy.measure.summarised` tells."""
+ERRORS = (
+    Column("rms", "Rms", "percent"),
+    Column("expected", "Expected", "percent"),
+    Column("worst", "Worst", "percent"),
+    hidden("worst_mode", "at mode", "count"),
+    hidden("problem", "Why not"),
+)
+"""Columns of the errors of one model."""
 
 
 def _repeats(study: AccuracyStudy) -> Repeats:
@@ -22,15 +41,8 @@ MEASURED = measured(lambda study: study.origins, _repeats)
 
 
 @table(
-    hidden("solid", "Solid"),
-    Column("title", "Solid"),
-    hidden("discretisation", "Discretisation"),
-    Column("label", "Model of"),
-    Column("rate", "Rate", "score"),
-    Column("unknowns", "At unknowns", "count"),
-    Column("error_at_unknowns", "rms error", "percent"),
-    Column("seconds", "In time", "seconds"),
-    Column("error_at_seconds", "rms error", "percent"),
+    *SOLID,
+    *SUMMARISED,
     keys="solid discretisation",
     conditions=MEASURED,
 )
@@ -44,19 +56,13 @@ def summary(study: AccuracyStudy) -> Iterator[Row]:
 
 
 @table(
-    hidden("solid", "Solid"),
-    Column("title", "Solid"),
-    hidden("discretisation", "Discretisation"),
-    Column("label", "Model of"),
+    *SOLID,
+    *MODEL,
     Column("spacing", "Spacing [mm]", "score", "mm"),
     Column("unknowns", "Unknowns", "count"),
     Column("build_seconds", "Build", "seconds"),
     Column("solve_seconds", "Solve", "seconds"),
-    Column("rms", "Rms", "percent"),
-    Column("expected", "Expected", "percent"),
-    Column("worst", "Worst", "percent"),
-    hidden("worst_mode", "at mode", "count"),
-    hidden("problem", "Why not"),
+    *ERRORS,
     keys="solid discretisation spacing",
     conditions=MEASURED,
 )
@@ -71,8 +77,7 @@ def levels(study: AccuracyStudy) -> Iterator[Row]:
 
 
 @table(
-    hidden("solid", "Solid"),
-    Column("title", "Solid"),
+    *SOLID,
     Column("degrees", "Degrees"),
     Column("change", "Change", "percent"),
     Column("first", "First [Hz]", "hertz", "Hz"),

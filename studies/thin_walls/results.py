@@ -3,22 +3,17 @@
 from functools import cached_property
 from typing import Any
 
+from studies.accuracy.results import LevelsOfSolids
 from studies.base.conditions import Record
-from studies.base.results import ResultsOfOneFile
 from studies.thin_walls.bounds import is_too_low
 
 BOUNDS = "bounds.json"
 
 
-class ThinWallStudy(ResultsOfOneFile):
+class ThinWallStudy(LevelsOfSolids):
     """The folder of the study."""
 
     section = "thin_walls"
-
-    @property
-    def without(self) -> str:
-        """One sentence if tetrahedra are left out; empty if not."""
-        return str(self.measured["without"])
 
     @property
     def titles(self) -> dict[str, str]:
@@ -47,15 +42,6 @@ class ThinWallStudy(ResultsOfOneFile):
             }
             for found in measured["solids"]
             if measured["kinds"][found["solid"]] in kinds
-        ]
-
-    def levels(self, solid: str, discretisation: str) -> list[dict[str, Any]]:
-        """Models of several sizes that have a spectrum, coarsest first."""
-        return [
-            level
-            for level in self.measured["levels"]
-            if (level["solid"], level["discretisation"]) == (solid, discretisation)
-            and "rms" in level
         ]
 
     @property

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from studies.accuracy.tables import ERRORS, MODEL, SUMMARISED
 from studies.base.conditions import NOT_TIMED, ONE_COLD_RUN, measured
 from studies.base.table import Column, Row, hidden, table
 from studies.thin_walls.references import HARMONICS, POLYNOMIALS, TETRAHEDRA
@@ -62,13 +63,7 @@ def _rows(study: ThinWallStudy, *kinds: str) -> Iterator[Row]:
 
 @table(
     *SOLID,
-    hidden("discretisation", "Discretisation"),
-    Column("label", "Model of"),
-    Column("rate", "Rate", "score"),
-    Column("unknowns", "At unknowns", "count"),
-    Column("error_at_unknowns", "rms error", "percent"),
-    Column("seconds", "In time", "seconds"),
-    Column("error_at_seconds", "rms error", "percent"),
+    *SUMMARISED,
     keys="solid discretisation",
     conditions=TIMED,
 )
@@ -84,16 +79,11 @@ def summary(study: ThinWallStudy) -> Iterator[Row]:
 
 @table(
     *SOLID,
-    hidden("discretisation", "Discretisation"),
-    Column("label", "Model of"),
+    *MODEL,
     Column("spacing", "Spacing [mm]", "score", "mm"),
     Column("unknowns", "Unknowns", "count"),
     Column("seconds", "Time", "seconds"),
-    Column("rms", "Rms", "percent"),
-    Column("expected", "Expected", "percent"),
-    Column("worst", "Worst", "percent"),
-    hidden("worst_mode", "at mode", "count"),
-    hidden("problem", "Why not"),
+    *ERRORS,
     keys="solid discretisation spacing",
     conditions=TIMED,
 )
