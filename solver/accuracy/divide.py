@@ -102,19 +102,24 @@ class DividedCells:
     def _most_unknowns(self) -> float:
         return max(LARGEST, MOST_GROWTH * self._undivided.n_dofs)
 
+    def _divisions_with(self, chosen: Index) -> list[Index]:
+        """Cells of every level that are divided if those `chosen` (d,) of today's are, too."""
+        cells = self.model.cells
+        levels, places = cells.levels[chosen], cells.corner[chosen] // cells.span[chosen, None]
+        both = [
+            np.concatenate([already, places[levels == level]])
+            for level, already in enumerate(self._divisions)
+        ]
+        distinct = [np.unique(each.astype(np.int64), axis=0) for each in both]
+        return balanced(distinct, self._covering.shape)
+
     def _divide(self, chosen: Index) -> bool:
         """Divide more cells (d,), those with the largest errors first, and whether there was room.
 
         Others are divided with them, since no neighbour is more than twice as large.
         """
-        cells = self.model.cells
-        levels, places = cells.levels[chosen], cells.corner[chosen] // cells.span[chosen, None]
-        while len(places):
-            divisions = list(self._divisions)
-            for level in range(MOST_LEVELS):
-                both = np.concatenate([divisions[level], places[levels == level]])
-                divisions[level] = np.unique(both.astype(np.int64), axis=0)
-            divisions = balanced(divisions, self._covering.shape)
+        while len(chosen):
+            divisions = self._divisions_with(chosen)
             try:
                 divided = self._covering.divided(divisions)
             except UserError as error:
@@ -122,8 +127,7 @@ class DividedCells:
                 return False
             if 3 * divided.n_nodes <= self._most_unknowns:
                 break
-            half = len(places) // 2
-            levels, places = levels[:half], places[:half]
+            chosen = chosen[: len(chosen) // 2]
         else:
             return False
         self._divisions = divisions

@@ -65,7 +65,6 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     own = values[elastic]
     space = enriched(model)
     chosen = np.ascontiguousarray(modes[:, elastic])
-    gain, within = gained(space, space.residual(own, chosen))
     # Cells of several materials, and those that are held, are taken to err as the others do.
     seen = space.usable_share(chosen)
     if np.median(seen) < LEAST_SEEN:
@@ -73,6 +72,7 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
             f"cells of several materials, or that are held, have {1.0 - np.median(seen):.0%} of "
             f"the strain energy, expected at most {1.0 - LEAST_SEEN:.0%}; raise --resolution"
         )
+    gain, within = gained(space, space.residual(own, chosen))
     gain = gain / np.maximum(seen, LEAST_SEEN)
     relative = np.sqrt(1.0 + BEYOND * gain / own) - 1.0
     shares = relative * within

@@ -163,8 +163,12 @@ def _seen_share(surface: Surface | Wall, inside: Inside, grid: Grid) -> float:
         surface.merge_vertices(merge_tex=True, merge_norm=True)
     if not surface.is_watertight or not surface.is_winding_consistent or surface.body_count != 1:
         return 1.0
-    full = np.count_nonzero(inside.state == FULL)
-    return float((full + 0.5 * sum(inside.volumes())) * grid.edge**3 / abs(surface.volume))
+    return float(_volume(inside) * grid.edge**3 / abs(surface.volume))
+
+
+def _volume(inside: Inside) -> float:
+    """Volume [voxels] by the lines."""
+    return float(np.count_nonzero(inside.state == FULL) + 0.5 * sum(inside.volumes()))
 
 
 def _unseen(surface: Surface | Wall, share: float, resolution: int, grid: Grid, name: str) -> str:
@@ -206,8 +210,7 @@ def _in_pieces(surface: Surface | Wall, volumes: np.ndarray, resolution: int, na
 
 
 def _is_more_than_a_crumb(inside: Inside) -> bool:
-    full = np.count_nonzero(inside.state == FULL)
-    return _holds(inside) and full + 0.5 * sum(inside.volumes()) >= SMALLEST_PIECE
+    return _holds(inside) and _volume(inside) >= SMALLEST_PIECE
 
 
 def _is_one_piece(inside: Inside) -> bool:

@@ -83,6 +83,14 @@ class Boxes:
             found[few] = function(places.reshape(-1, 3)).reshape(places.shape[:2])
         return found
 
+    def points(self, box: Index, axis: Index, along: Array, across: Array) -> Array:
+        """Points (p, 3) [m] in boxes (p,), at `along` (p,) an axis and `across` (p, 2), 0 to 1."""
+        local = np.empty((len(box), 3))
+        turned = (axis[:, None] + np.arange(3)) % 3
+        np.put_along_axis(local, turned, np.column_stack([along, across]), axis=1)
+        corner, edges = self.frames
+        return np.asarray(corner[box] + np.einsum("pij,pj->pi", edges[box], local))
+
     def integrals(self, pieces: LocalPieces, group: Index, count: int) -> Array:
         """Integrals (count, d) of the points' Lagrange polynomials over pieces, by `group` (p,)."""
         return _integrals(self.cells.basis, self.local, pieces, group, count)
@@ -151,12 +159,7 @@ class _Lines:
     def points(self, line: Index, along: Array) -> Array:
         """Points (p, 3) [m] on lines (p,), at places along them from 0 to 1."""
         box, number = np.divmod(line, len(self.places))
-        local = np.empty((len(line), 3))
-        turned = (self.axis[box, None] + np.arange(3)) % 3
-        both = np.concatenate([along[:, None], self.places[number]], axis=1)
-        np.put_along_axis(local, turned, both, axis=1)
-        corner, edges = self.boxes.frames
-        return np.asarray(corner[box] + np.einsum("pij,pj->pi", edges[box], local))
+        return self.boxes.points(box, self.axis[box], along, self.places[number])
 
     def are_cut(self, line: Index) -> Flags:
         """Which lines (p,) are in boxes that the surface cuts."""

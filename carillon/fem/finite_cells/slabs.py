@@ -25,7 +25,7 @@ AT_ONCE = 2048
 
 @dataclass(frozen=True)
 class Slabs(Boxes):
-    """What cells have of voxels in which it is thin, as straight bodies of the same moments."""
+    """Portions of voxels in which the solid is thin, each as a straight body of its moments."""
 
     bodies: tuple[Array, Array]
     """Middles and edges of all portions, see `straight_bodies`."""
@@ -42,31 +42,24 @@ class Slabs(Boxes):
         return middle - 0.5 * edges.sum(axis=2), edges
 
     def integrals(self, pieces: LocalPieces, group: Index, count: int) -> Array:
-        cells, (corner, edges) = self.cells, self.frames
+        cells = self.cells
         nodes, shares = np.polynomial.legendre.leggauss(cells.basis.degree + 1)
         cell = cells.cell[self.portion]
-        cell_corner = cells.origin + cells.step * cells.corner[cell]
-        volumes = cells.shares[self.portion]
+        corner, edge = cells.origin + cells.step * cells.corner[cell], cells.edges[cell]
+        length = pieces.high - pieces.low
+        share = cells.shares[self.portion][pieces.box] * pieces.share * length
         summed = np.zeros((count, cells.basis.n_points))
         for first in range(0, len(group), AT_ONCE):
-            few = slice(first, first + AT_ONCE)
-            box, length = pieces.box[few], (pieces.high - pieces.low)[few]
-            along = pieces.low[few, None] + length[:, None] * (nodes + 1.0) / 2.0
-            local = np.empty((*along.shape, 3))
-            turned = (pieces.axis[few, None] + np.arange(3)) % 3
-            both = np.concatenate(
-                [along[:, :, None], np.repeat(pieces.across[few, None], len(nodes), axis=1)], axis=2
-            )
-            np.put_along_axis(local, np.repeat(turned[:, None], len(nodes), axis=1), both, axis=2)
-            place = corner[box, None] + np.einsum("pij,pnj->pni", edges[box], local)
-            place = (place - cell_corner[box, None]) / cells.edges[cell[box], None, None]
-            weight = (volumes[box] * pieces.share[few] * length)[:, None] * (shares / 2.0)
-            values = cells.basis.polynomials(place.reshape(-1, 3))
-            rows = np.repeat(group[few], len(nodes))
-            matrix = sp.csr_matrix(
-                (weight.ravel(), (rows, np.arange(len(rows)))), (count, len(rows))
-            )
-            summed += matrix @ values
+            # Pieces of lines, each with all of its points.
+            few = np.repeat(np.arange(first, min(first + AT_ONCE, len(group))), len(nodes))
+            along = np.tile((nodes + 1.0) / 2.0, len(few) // len(nodes))
+            along = pieces.low[few] + length[few] * along
+            weight = share[few] * np.tile(shares / 2.0, len(few) // len(nodes))
+            box = pieces.box[few]
+            place = self.points(box, pieces.axis[few], along, pieces.across[few])
+            values = cells.basis.polynomials((place - corner[box]) / edge[box, None])
+            rows = group[few], np.arange(len(few))
+            summed += sp.csr_matrix((weight, rows), (count, len(few))) @ values
         return summed
 
 
