@@ -105,7 +105,7 @@ class Kinks:
     """Borders, and how their kinks follow the nodes of the cells."""
 
     degree: int
-    """Of the cells' shape functions, see `carillon.fem.finite_cells.basis`."""
+    """Degree of the cells' shape functions, see `carillon.fem.finite_cells.basis`."""
     borders: Borders
     regions: Regions
     taken: Array

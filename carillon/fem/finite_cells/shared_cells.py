@@ -21,7 +21,7 @@ from carillon.fem.regions import RegionOf, Regions
 
 @dataclass(frozen=True, eq=False)
 class SharedCells:
-    """What regions share of the cells' parts of voxels, all of whose arrays have a row for each."""
+    """Parts of voxels by region, in cells of several regions; arrays have a row for each part."""
 
     portion: Index
     """(e,) which of the cells' parts of voxels it is of, see `FiniteCells.cell`."""
@@ -121,7 +121,7 @@ def _slots(
 
 
 def side_moduli(borders: Borders, cell: Index, law: RegionOf, young: Array) -> Array:
-    """Those (k, 2, d) of `young` (k, s, d) that belong to the two sides of borders.
+    """Moduli, or weights, (k, 2, d) of the two sides of borders, from `young` (k, s, d) by region.
 
     `law` (k, s) are the regions of cells, `cell` (k,) the numbers of their borders.
     """

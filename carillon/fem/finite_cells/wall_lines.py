@@ -36,7 +36,7 @@ def pieces_in_bodies(
 
 
 def shared(one: Pieces, other: Pieces, is_inside: bool) -> Pieces:
-    """What of `one` lies in `other`, or if not `is_inside`, beside it; both on the same lines."""
+    """Pieces of `one` in `other`, or beside it if not `is_inside`; both are on the same lines."""
     start, low, high = _shared(
         one.start, one.low, one.high, other.start, other.low, other.high, is_inside
     )

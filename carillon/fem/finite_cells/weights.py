@@ -19,7 +19,7 @@ AT_ONCE = 4096
 
 @dataclass(frozen=True, eq=False)
 class Portions:
-    """What parts of cells have of their voxels, ordered by part and voxel."""
+    """Shares that parts of cells have in voxels, ordered by part and voxel."""
 
     part: Index
     voxel: Index
@@ -42,7 +42,7 @@ def portions_of_parts(
     first: Index,
     parts: int,
 ) -> Portions:
-    """What each of the `parts` of cells has of their voxels.
+    """Shares of each of the `parts` of cells in their voxels.
 
     A voxel is integrated along the axes that the surface faces there. `cells` (k, 3), `count`,
     `state` (k, count^3), `pieces` and `labels` are as in `carillon.fem.finite_cells.parts`,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Flags, Index
 
 NOTHING, CYLINDER, BALL = 0, 1, 2
-"""What bounds a body besides its planes."""
+"""Round surface that bounds a body besides its planes."""
 TOUCHING = 1e-9
 """Gap between two pieces that are one, and distance by which planes between bodies are moved apart,
 so that none slips between two that share one; in units of the lattice."""
