@@ -199,6 +199,10 @@ def test_a_needle_is_told_a_resolution_that_does(place, resolution):
     assert finite_cells(needle, better).volume == pytest.approx(needle.volume, rel=0.011)
 
 
+def test_a_needle_of_twenty_kilometres_is_solved_at_a_high_resolution():
+    assert finite_cells(box(2e4, 0.15, 0.1), 4096).volume == pytest.approx(300.0)
+
+
 SHEET = trimesh.Trimesh([[0, 0, 0], [1, 0, 0.2], [0, 1, 0.7]], [[0, 1, 2]])
 
 
@@ -210,12 +214,24 @@ SHEET = trimesh.Trimesh([[0, 0, 0], [1, 0, 0.2], [0, 1, 0.7]], [[0, 1, 2]])
             16,
             "parts far thinner than the lattice.*raise the",
         ),
-        (box(2e4, 0.15, 0.1), 8, "parts far thinner than the lattice|encloses nothing"),
+        (
+            box(2e4, 0.15, 0.1),
+            8,
+            "parts far thinner than the lattice.*raise the resolution to 4096$",
+        ),
+        (box(2e9, 0.15, 0.1), 8, "parts far thinner than the lattice.*or make them thicker$"),
         (SHEET, 8, "encloses nothing; expected a surface around a solid"),
         (box(0.2, 0.1, 0.1), 1, "expected a whole number of at least 2"),
         (box(0.2, 0.1, 0.1), 4000, "use a resolution of about"),
     ],
-    ids=["needle", "needle of two kilometres", "sheet", "resolution 1", "too many"],
+    ids=[
+        "needle",
+        "needle of twenty kilometres",
+        "longer needle",
+        "sheet",
+        "resolution 1",
+        "too many",
+    ],
 )
 def test_what_is_refused(surface, resolution, sentence):
     with pytest.raises(UserError, match=sentence):

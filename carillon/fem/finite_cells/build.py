@@ -24,7 +24,7 @@ SEEN, SURELY_SEEN = 0.03, 0.01
 of a resolution which is proposed."""
 THINNEST = 0.01
 """Thickness of a wall, over the spacing, below which it is refused."""
-TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+TRIAL_FACTORS = (1.25, 1.5, 2.0, 3.0, 4.0, 6.0, *(2.0**power for power in range(3, 16)))
 """Factors by which a resolution is raised in search of one at which nothing is lost, or the solid
 is in one piece."""
 TRIAL_GRID = 4_000_000
@@ -156,14 +156,20 @@ def _holds(inside: Inside) -> bool:
 
 def _seen_share(surface: Surface | Wall, inside: Inside, grid: Grid) -> float:
     """Volume by the lines over that of the surface; 1 unless this is one closed shell."""
+    volume = _shell_volume(surface)
+    return float(_volume(inside) * grid.edge**3 / volume) if volume else 1.0
+
+
+def _shell_volume(surface: Surface | Wall) -> float | None:
+    """Volume [m^3] inside the surface; None unless this is one closed shell."""
     if isinstance(surface, Wall):
-        return 1.0
+        return None
     if not surface.is_watertight:  # Triangles may have vertices of their own.
         surface = surface.copy(include_cache=False)
         surface.merge_vertices(merge_tex=True, merge_norm=True)
     if not surface.is_watertight or not surface.is_winding_consistent or surface.body_count != 1:
-        return 1.0
-    return float(_volume(inside) * grid.edge**3 / abs(surface.volume))
+        return None
+    return abs(float(surface.volume))
 
 
 def _volume(inside: Inside) -> float:
@@ -186,8 +192,9 @@ def _lost(surface: Surface | Wall, inside: Inside, resolution: int, grid: Grid, 
     nothing = f"{start} encloses nothing; expected a surface around a solid, repair the mesh"
     if inside.sheet:
         return nothing
-    better = _better_resolution(surface, resolution, _is_more_than_a_crumb, TRIAL_GRID)
-    if not better and not any(len(each.low) for each in inside.pieces):
+    better = _better_resolution(surface, resolution, _is_more_than_a_crumb, PIECES_GRID)
+    crossed = any(len(each.low) for each in inside.pieces)
+    if not (better or crossed or _shell_volume(surface)):
         return nothing
     remedy = f"to {better}" if better else "or make them thicker"
     return (
@@ -210,7 +217,10 @@ def _in_pieces(surface: Surface | Wall, volumes: np.ndarray, resolution: int, na
 
 
 def _is_more_than_a_crumb(inside: Inside) -> bool:
-    return _holds(inside) and _volume(inside) >= SMALLEST_PIECE
+    if not _holds(inside) or _volume(inside) < SMALLEST_PIECE:
+        return False
+    volumes = pieces(cover_of(inside, basis()))[1]
+    return bool((volumes >= SMALLEST_PIECE).any())
 
 
 def _is_one_piece(inside: Inside) -> bool:
@@ -222,11 +232,14 @@ def _better_resolution(
     surface: Surface | Wall, resolution: int, accepts: Callable[[Inside], bool], largest: int
 ) -> int | None:
     """A higher resolution that `accepts` what is inside, on a grid of at most `largest` voxels."""
+    volume = _shell_volume(surface)
     for factor in TRIAL_FACTORS:
         better = int(np.ceil(factor * resolution))
         trial = cell_grid(surface, better)
         if np.prod([float(size) for size in trial.shape]) > largest:
             return None
+        if volume and volume < SMALLEST_PIECE * trial.edge**3:
+            continue
         inside = find_inside(surface, trial)
         if accepts(inside) and abs(_seen_share(surface, inside, trial) - 1.0) <= SURELY_SEEN:
             return better

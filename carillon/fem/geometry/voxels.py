@@ -93,6 +93,7 @@ def voxelize(
     (8, True)
     """
     resolution = checked_resolution(surface, resolution, name)
+    _require_few_triangles(surface, resolution, name)
     if fill not in FILLS:
         raise UserError(f"fill {fill!r} is unknown, expected one of {', '.join(FILLS)}")
     if components not in COMPONENTS:
@@ -117,7 +118,7 @@ def voxelize(
 def checked_resolution(surface: Surface, resolution: int, name: str) -> int:
     """The resolution as an int.
 
-    Raises UserError if it is none of at least 2, or needs too large a grid or too many triangles.
+    Raises UserError if it is none of at least 2, or needs too large a grid.
     """
     try:
         checked = operator.index(resolution)
@@ -136,14 +137,17 @@ def checked_resolution(surface: Surface, resolution: int, name: str) -> int:
             f"mesh {name!r} at resolution {checked:,} needs a grid of {count:,.0f} voxels, the "
             f"limit is {MAX_GRID:,}; use a resolution of about {largest} or less"
         )
-    pieces = cut_triangles(surface, float(extents.max()) / checked / 2)
+    return checked
+
+
+def _require_few_triangles(surface: Surface, resolution: int, name: str) -> None:
+    pieces = cut_triangles(surface, float(surface.extents.max()) / resolution / 2)
     if pieces > MAX_TRIANGLES:
         raise UserError(
-            f"mesh {name!r} at resolution {checked} would be cut into {pieces:.2g} triangles, the "
-            f"limit is {MAX_TRIANGLES:,}; it has too many large triangles, or use a lower "
+            f"mesh {name!r} at resolution {resolution} would be cut into {pieces:.2g} triangles, "
+            f"the limit is {MAX_TRIANGLES:,}; it has too many large triangles, or use a lower "
             "resolution"
         )
-    return checked
 
 
 def _filled_model(
