@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
+from sound.clips.audibility import heard_partials, loudness_shares
 from sound.clips.extraction import ModalSound
 
 SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
@@ -21,8 +22,8 @@ APART = 3e-3
 averages their amplitudes, see `sound.design.objective.RESOLVED`."""
 HEARD = 1e-3
 """Least amplitude of an audible mode, over that of the clip's loudest (-60 dB)."""
-FEWEST_MODES, MOST_MODES = 2, 30
-"""Least and greatest number of modes of a design whose project leaves the number to the clips."""
+MOST_MODES = 30
+"""Greatest number of partials of a design whose project leaves the number to the clips."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,9 @@ class Targets:
 
     Ascending frequencies (N,) [Hz] and dampings (N,) [1/s] are shared by all points; amplitudes (T,
     N) are those at the strike, 0 where the clip of a point lacks a mode.  `residuals` are T arrays
-    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.
+    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.  Modes that are
+    `silent` (N,), none if None, are partials of no clip: they lie between partials, and shall not
+    sound, wherever their frequencies come to be.
     """
 
     names: tuple[str, ...]
@@ -40,6 +43,26 @@ class Targets:
     amplitudes: Array
     residuals: tuple[Array, ...]
     rates: tuple[int, ...]
+    silent: Flags | None = None
+    left_out: Array | None = None
+    left_out_share: float = 0.0
+    """(q,) [Hz] or None: partials of the clips that no mode of the solid has, and their share in
+    the loudness of the clips."""
+
+    @property
+    def sounding(self) -> Index:
+        """Numbers (p,) of the modes that are partials of a clip."""
+        if self.silent is None:
+            return np.arange(len(self.frequencies))
+        return np.flatnonzero(~self.silent)
+
+    @property
+    def shares(self) -> Array:
+        """Shares (N,) of the modes in the loudness of the clips, the mean over these."""
+        of_clips = [
+            loudness_shares(self.frequencies, self.dampings, row) for row in self.amplitudes
+        ]
+        return np.asarray(np.mean(of_clips, axis=0))
 
 
 def share_frequencies(
@@ -49,21 +72,26 @@ def share_frequencies(
 ) -> Targets:
     """The `modes` modes of greatest energy in all clips, with amplitudes per clip; all if None.
 
-    `auto` takes the modes that a design can use: of modes closer than `APART` the stronger one
-    stands for both, and modes below `HEARD` in every clip are left out; at most `MOST_MODES`, or
-    one for each clip if there are more clips.
+    `auto` takes the partials that are heard, the loudest of each clip, see
+    `sound.clips.audibility`; of those closer than `APART` in several clips the louder one stands
+    for both. At most `MOST_MODES`, or one for each clip if there are more clips.
 
     Modes of different clips that sound the same become one, whose frequency and damping are means
     weighted by amplitude. Modes are chosen one by one, each time the strongest of the clip whose
-    energy is covered least. Shares of energy count, so loud and quiet clips count alike.  Raises
-    UserError if fewer modes were extracted from all clips together, or `auto` finds fewer than
-    `FEWEST_MODES`.
+    energy is covered least, or whose loudness is. Shares count, so loud and quiet clips count
+    alike.  Raises UserError if fewer modes were extracted from all clips together.
     """
+    if modes == "auto":
+        sounds = [heard_partials(sound) for sound in sounds]
     owners = np.repeat(np.arange(len(sounds)), [len(sound.frequencies) for sound in sounds])
     frequencies = np.concatenate([sound.frequencies for sound in sounds])
     dampings = np.concatenate([sound.dampings for sound in sounds])
     amplitudes = np.concatenate([sound.amplitudes for sound in sounds])
-    shares = np.concatenate([sound.energies / sound.energies.sum() for sound in sounds])
+    if modes == "auto":
+        values = [(each.frequencies, each.dampings, each.amplitudes) for each in sounds]
+        shares = np.concatenate([loudness_shares(*each) for each in values])
+    else:
+        shares = np.concatenate([sound.energies / sound.energies.sum() for sound in sounds])
 
     groups = _groups(frequencies, owners)
     count = int(groups.max()) + 1
@@ -82,13 +110,7 @@ def share_frequencies(
     shared = np.bincount(groups, weights * frequencies) / weight
     if modes == "auto":
         table, covered = _usable(shared, table, covered)
-        usable = int(covered.any(axis=0).sum())
-        if usable < FEWEST_MODES:
-            raise UserError(
-                f"the clips ({', '.join(names)}) have {usable} mode in all that stands apart and "
-                f"is heard, a design needs {FEWEST_MODES} at least; give another clip"
-            )
-        modes = min(usable, max(MOST_MODES, len(sounds)))
+        modes = min(int(covered.any(axis=0).sum()), max(MOST_MODES, len(sounds)))
     chosen = _chosen(covered, count if modes is None else modes)
     chosen = chosen[np.argsort(shared[chosen])]
     return Targets(

@@ -83,6 +83,7 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     from sound.outputs import require_output
     from sound.project.design_file import read_design, write_design
     from sound.project.project import load_project
+    from sound.rendering.verdict import with_verdict
 
     _require_one_rank()
     if options.watch and (settings.seconds or settings.evaluations):
@@ -110,6 +111,7 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         result = design_on(edited, problem, initial, out, show)
     else:
         result = optimise(problem, initial, lambda each: write_design(out, each), show)
+        result = with_verdict(result)
         write_design(out, result)
     summary = summarise(result)
     print(json.dumps(summary) if options.json else _sentences(out, result, summary))
@@ -159,25 +161,28 @@ class _SearchProgress:
 
 def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
-    from sound.design.pitch import rms_cents
+    from sound.design.pitch import rms_off_partials
 
-    evidence = design.evidence
-    targets = design.targets.frequencies
-    off = np.abs(design.frequencies / targets - 1.0)
+    evidence, targets = design.evidence, design.targets
+    which = targets.sounding
+    off = np.abs(design.frequencies / targets.frequencies - 1.0)[which]
     assert design.damping is not None
-    ratios = design.damping.dampings / design.targets.dampings
+    ratios = (design.damping.dampings / targets.dampings)[which]
     loss = design.damping.loss_factors
     return {
         **{key: evidence[key] for key in _COSTS},
         "fall": fall(evidence["cost_start"], evidence["cost"]),
         **{key: evidence[key] for key in _EFFORT},
         "modes": len(design.frequencies),
+        "partials": len(which),
         "targets": [strike.name for strike in design.strikes],
         "target_distances_m": [strike.distance for strike in design.strikes],
         "frequency_error_median": float(np.median(off)),
         "frequency_error_max": float(off.max()),
-        "coarse_rms_cents": rms_cents(design.coarse_frequencies, targets),
-        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, targets),
+        "coarse_rms_cents": rms_off_partials(design.coarse_frequencies, targets),
+        "fine_rms_cents": None
+        if design.fine is None
+        else rms_off_partials(design.frequencies, targets),
         "checks": evidence["checks"],
         "young_min_pa": float(design.young.min()),
         "young_max_pa": float(design.young.max()),
@@ -188,6 +193,7 @@ def summarise(design: Design) -> dict[str, Any]:
         "loss_factors": [] if loss is None else np.unique(loss).tolist(),
         "mass_damping_per_second": design.damping.mass_per_second,
         "residual_max": evidence["residual_max"],
+        "verdict": evidence.get("verdict"),
     }
 
 
@@ -219,12 +225,14 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"cost {summary['cost_start']:.4g} -> {summary['cost']:.4g} ({summary['fall']:.1%} "
             f"less) in {summary['seconds']:.1f} s and {summary['evaluations']:,} evaluations "
             f"({summary['evaluations_per_minute']:,.0f} a minute, {summary['workers']} workers)",
-            f"frequencies of {summary['modes']} modes: median error "
-            f"{summary['frequency_error_median']:.2%}, worst {summary['frequency_error_max']:.2%}; "
+            f"frequencies of {summary['partials']} partials among {summary['modes']} modes: "
+            f"median error {summary['frequency_error_median']:.2%}, worst "
+            f"{summary['frequency_error_max']:.2%}; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
             _rms_sentence(summary),
             *_material_sentences(design, summary),
             _damping_sentence(summary),
+            *([summary["verdict"]["sentence"]] if summary["verdict"] else []),
             f"design: {out}",
         ]
     )

@@ -67,8 +67,8 @@ class Objective:
     """Eq. (1) to (4) for N elastic modes and T struck points, with the weights w_f, w_a and w_r.
 
     `targets` are the modes that the points shall have; `shift` (T, N) is added to their balances of
-    amplitudes. Frequencies are relative to the first one, or as they are if `absolute`: those of a
-    solid whose supports give it a scale of its own.
+    amplitudes. Frequencies are relative to the first partial, or as they are if `absolute`: those
+    of a solid whose supports give it a scale of its own. Those of silent modes do not count.
     """
 
     def __init__(
@@ -82,19 +82,17 @@ class Objective:
         self.weights = weights
         self.absolute = absolute
         self._bark = bark(targets.frequencies)
+        self._first = int(targets.sounding[0])
+        self.compared = targets.sounding if absolute else targets.sounding[1:]
+        """Numbers (p,) of the modes that have differences of frequency."""
         energies = _average(targets.frequencies, targets.amplitudes**2)
         self._target = np.sqrt(energies / np.maximum(energies.max(axis=1, keepdims=True), TINY))
         if shift is not None:
             self._target = self._target + shift
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
-        """Bark differences (N - 1,) of the second mode to the last (Eq. 1), (N,) if absolute."""
-        return np.asarray(bark(self._scaled(eigenvalues)) - self._bark)[self._first :]
-
-    @property
-    def _first(self) -> int:
-        """The first mode that has a difference."""
-        return 0 if self.absolute else 1
+        """Bark differences (p,) of the modes that are `compared` (Eq. 1)."""
+        return np.asarray(bark(self._scaled(eigenvalues)) - self._bark)[self.compared]
 
     def amplitude_residual(self, eigenvalues: Array, pushed: Array) -> Array:
         """Differences (T, N) of the balances (Eq. 2, and the first mode)."""
@@ -111,13 +109,13 @@ class Objective:
         return DesignCost(total, frequency, amplitude, regulariser)
 
     def frequency_jacobian(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
-        """Derivatives (N - 1, m) of `frequency_residual`, (N, m) if absolute."""
+        """Derivatives (p, m) of `frequency_residual`."""
         scaled = self._scaled(eigenvalues)
         relative = 0.5 * _slopes(eigenvalues, sensitivity) / eigenvalues
         if not self.absolute:
-            relative = relative - relative[:, :1]
+            relative = relative - relative[:, self._first, None]
         rows = (bark_slope(scaled) * scaled) * relative
-        return np.asarray(rows.T[self._first :])
+        return np.asarray(rows.T[self.compared])
 
     def amplitude_jacobian(
         self, eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
@@ -133,10 +131,13 @@ class Objective:
         return np.asarray(0.5 * balance[:, :, None] * (relative - relative_peak[:, None, :]))
 
     def _scaled(self, eigenvalues: Array) -> Array:
-        """s_f f_i with s_f = F_1 / f_1, or 1 if absolute."""
+        """s_f f_i with s_f = F_1 / f_1 of the first partial, or 1 if absolute."""
         if self.absolute:
             return frequencies(eigenvalues)
-        return np.asarray(self.targets.frequencies[0] * np.sqrt(eigenvalues / eigenvalues[0]))
+        first = self._first
+        return np.asarray(
+            self.targets.frequencies[first] * np.sqrt(eigenvalues / eigenvalues[first])
+        )
 
     def balance(self, eigenvalues: Array, pushed: Array) -> Array:
         """Amplitudes (T, N) of modes over the loudest at each point; `cost` has the parameters."""

@@ -26,10 +26,11 @@ from carillon.processes.threads import one_thread
 from solver.distribution.partition import partition_cells
 from solver.files.modes_file import frequencies
 from solver.response.dissipation import dissipation, is_known
+from sound.clips.targets import Targets
 from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
-from sound.design.pitch import common_factor
+from sound.design.pitch import stretch_to
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search, require_modes
 from sound.design.simulation import Evaluation, Simulation
@@ -115,7 +116,7 @@ class Outcome:
         hertz = frequencies(evaluation.eigenvalues) if fine is None else fine.frequencies
         # Springs and masses of supports give the solid a scale of its own.
         is_free = not setting.objective.absolute
-        stretch = common_factor(hertz, targets.frequencies) if is_free else 1.0
+        stretch = stretch_to(hertz, targets) if is_free else 1.0
         moduli = stretch**2 * setting.material.moduli(evaluation.z)
         regions = simulation.regions(evaluation.z)
         bounds = problem.project.material.young_bounds if is_free else None
@@ -144,7 +145,7 @@ class Outcome:
                     problem.project.damping.regions,
                     stretch * hertz,
                     order,
-                    targets.dampings,
+                    targets,
                 )
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
@@ -240,9 +241,9 @@ def material_damping(
     regions: int,
     hertz: Array,
     order: NDArray[np.integer],
-    targets: Array,
+    targets: Targets,
 ) -> MaterialDamping:
-    """Loss factors that bring the dampings of a material's modes near to the targets (N,) [1/s].
+    """Loss factors that bring the dampings of a material's partials near to those of the targets.
 
     There are so many regions of the voxels with a loss factor each; they depend on the solid alone.
     The modes have the frequencies `hertz` (N,) [Hz], and the numbers `order` (N,) in the
@@ -250,7 +251,8 @@ def material_damping(
     """
     labels = partition_cells(mesh, min(regions, mesh.n_cells))
     shares = simulation.energy_shares(evaluation, labels)[order]
-    factors, mass = fitted_loss_factors(shares, hertz, targets)
+    which = targets.sounding
+    factors, mass = fitted_loss_factors(shares[which], hertz[which], targets.dampings[which])
     dampings = 0.5 * mass + np.pi * hertz * (shares @ factors)
     return MaterialDamping(factors[labels], mass, np.maximum(dampings, 0.0))
 

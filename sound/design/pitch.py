@@ -1,12 +1,31 @@
 """Frequencies as the ear spaces them: distances in cents, and critical-band rate."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from carillon.arrays import Array
 
+if TYPE_CHECKING:
+    from sound.clips.targets import Targets
+
 CENTS = 1200.0
 """Number of cents in an octave."""
 _NARROW_HERTZ, _WIDE_HERTZ = 1000.0 / 0.76, 7500.0
+
+
+def stretch_to(frequencies: Array, targets: Targets) -> float:
+    """The factor of frequencies (N,) that brings those of partials nearest to their targets."""
+    which = targets.sounding
+    return common_factor(frequencies[which], targets.frequencies[which])
+
+
+def rms_off_partials(frequencies: Array, targets: Targets) -> float:
+    """`rms_cents` of the partials among frequencies (N,) [Hz], silent modes aside."""
+    which = targets.sounding
+    return rms_cents(frequencies[which], targets.frequencies[which])
 
 
 def common_factor(frequencies: Array, targets: Array) -> float:

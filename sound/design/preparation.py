@@ -20,12 +20,14 @@ from carillon.fem.geometry import HexMesh
 from carillon.fem.model import fine_model
 from carillon.fem.regions import Regions
 from carillon.fem.supports import Supports
-from carillon.processes.threads import allowed_cores
-from solver.analysis.problem import ProblemOptions, discretised
+from carillon.processes.threads import allowed_cores, one_thread
+from solver.analysis.problem import AUTO, ProblemOptions, discretised
 from solver.analysis.solid_surface import SolidSurface
+from solver.files.modes_file import frequencies
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.clips.wav import read_wav
+from sound.design.assignment import Spectrum, assigned
 from sound.design.constants import NOTHING, FreeConstants, free_density, free_poisson
 from sound.design.elements import coarsening_of
 from sound.design.material import ReducedMaterial
@@ -36,6 +38,8 @@ from sound.project.project import Project
 from sound.project.settings import MaterialSettings
 from sound.strikes import Strike
 
+MODES = 40
+"""Modes of a solid among which the partials of clips find theirs."""
 STIFFER = 10.0
 """Stiffness of what holds the solid of a search, over that for the moduli that it starts from: a
 design may raise them."""
@@ -171,14 +175,27 @@ def prepare(
     surface = project.surface() if solid is None else solid.surface
     if targets is None:
         strikes = usable_strikes(project, surface)
-        targets = targets_of(project)
+        sought = targets_of(project)
     else:
-        strikes = project.strikes(surface)
-    project = replace(project, modes=len(targets.frequencies))
+        strikes, sought = project.strikes(surface), targets
     solid = solid or prepared_solid(project.solid, project.material, surface, project.composition)
+    if targets is None and project.modes == AUTO:
+        sought = assigned(sought, sought.shares, _spectrum(project, solid, strikes))
+    targets = sought
+    project = replace(project, modes=len(targets.frequencies))
     objective = Objective(targets, project.weights, absolute=solid.has_scale)
     setting = solid.setting(project.solid, strikes, objective)
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
+
+
+def _spectrum(project: Project, solid: PreparedSolid, strikes: Sequence[Strike]) -> Spectrum:
+    """The lowest modes of a solid of the material that the search starts from."""
+    nothing: Any = None
+    setting = solid.setting(project.solid, strikes, nothing)
+    with one_thread():
+        simulation = setting.simulation(modes=MODES)
+        evaluation = simulation.evaluate(np.zeros(solid.material.dimensions))
+    return Spectrum(frequencies(evaluation.eigenvalues), evaluation.pushed)
 
 
 _MEANING: dict[str, Any] = {

@@ -86,7 +86,7 @@ class SomeModes(Objective):
 
     def __init__(self, targets: Targets, modes: Sequence[int], absolute: bool = False) -> None:
         super().__init__(targets, Weights(1.0, 0.0, 0.0), None, absolute)
-        self._rows = np.array(modes) - self._first
+        self._rows = np.searchsorted(self.compared, modes)
 
     def frequency_residual(self, eigenvalues: Array) -> Array:
         """Bark differences of the modes that count (Eq. 1)."""
@@ -102,10 +102,10 @@ class _Known:
     targets, the first mode being at its target unless they are `absolute`.
     """
 
-    def __init__(self, targets: Array, absolute: bool) -> None:
+    def __init__(self, targets: Targets, absolute: bool) -> None:
         self._targets, self._absolute = targets, absolute
         self._materials: list[Array] = []
-        self.off = np.empty((0, len(targets)))
+        self.off = np.empty((0, len(targets.frequencies)))
 
     def add(self, trials: Sequence[Trial]) -> None:
         for trial in trials:
@@ -138,34 +138,33 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
     """
     begin = time.monotonic()
     objective = problem.setting.objective
-    targets, first = objective.targets.frequencies, int(not objective.absolute)
-    own = distances(design.frequencies, targets, objective.absolute)
-    missed = [mode for mode in range(first, len(targets)) if abs(own[mode]) > HAD_CENTS]
+    targets, compared = objective.targets.frequencies, objective.compared.tolist()
+    own = distances(design.frequencies, objective.targets, objective.absolute)
+    missed = [mode for mode in compared if abs(own[mode]) > HAD_CENTS]
     if not missed:
-        modes = [_judged(mode, own, targets, first) for mode in range(first, len(targets))]
-        return Reach(modes, len(targets), time.monotonic() - begin)
+        modes = [_judged(mode, own, targets, compared) for mode in compared]
+        return Reach(modes, len(objective.targets.sounding), time.monotonic() - begin)
     limit = np.inf if seconds is None else seconds
     with _Descents(problem, descents) as search:
         search.look_at(
             [coordinates_of(problem, design), *_samples(problem.setting.material.dimensions)]
         )
         together = search.together(begin + 0.5 * limit)
-        groups = [
-            group for mode in missed for group in ((mode,), _beside(mode, len(targets), first))
-        ]
+        groups = [group for mode in missed for group in ((mode,), _beside(mode, compared))]
         search.approach(list(dict.fromkeys(groups)), begin + limit)
-    modes = [_judged(mode, own, targets, first, search) for mode in range(first, len(targets))]
+    modes = [_judged(mode, own, targets, compared, search) for mode in compared]
     return Reach(modes, together, time.monotonic() - begin)
 
 
-def distances(hertz: Array, targets: Array, absolute: bool) -> Array:
-    """Distances (N,) [cents] of frequencies (N,) above targets (N,).
+def distances(hertz: Array, targets: Targets, absolute: bool) -> Array:
+    """Distances (N,) [cents] of frequencies (N,) above their targets.
 
-    Relative to the first mode's, unless they are `absolute`.
+    Relative to the first partial's, unless they are `absolute`.
     """
+    aims, first = targets.frequencies, targets.sounding[0]
     if absolute:
-        return cents(hertz, targets)
-    return cents(hertz / hertz[0], targets / targets[0])
+        return cents(hertz, aims)
+    return cents(hertz / hertz[first], aims / aims[first])
 
 
 class _Descents:
@@ -180,7 +179,8 @@ class _Descents:
         self._targets, self._absolute = setting.objective.targets, setting.objective.absolute
         self._most = most
         self._pool = Pool(setting.fine() if setting.is_coarsened else setting, problem.workers)
-        self.known = _Known(self._targets.frequencies, self._absolute)
+        self._compared = setting.objective.compared.tolist()
+        self.known = _Known(self._targets, self._absolute)
         self.sought: set[tuple[int, ...]] = set()
 
     def __enter__(self) -> _Descents:
@@ -199,16 +199,15 @@ class _Descents:
             )
 
     def together(self, deadline: float) -> int:
-        """Number of modes from the first one on whose targets one material meets."""
-        count = len(self._targets.frequencies)
-        first = int(not self._absolute)
-        for last in range(first, count):
-            group = tuple(range(first, last + 1))
+        """Number of partials from the first one on whose targets one material meets."""
+        count = len(self._targets.sounding)
+        for last in range(len(self._compared)):
+            group = tuple(self._compared[: last + 1])
             if self.known.least(group) > HAD_CENTS:
                 tasks = [self._task(group, rank, deadline) for rank in range(self._most)]
                 self._run(tasks, deadline)
             if self.known.least(group) > HAD_CENTS:
-                return last
+                return count - len(self._compared) + last
         return count
 
     def approach(self, groups: Sequence[tuple[int, ...]], deadline: float) -> None:
@@ -251,18 +250,24 @@ def _samples(size: int) -> list[Array]:
     return samples
 
 
-def _beside(mode: int, count: int, first: int = 1) -> tuple[int, ...]:
-    """Numbers of a mode and its neighbours, without those that meet their targets by definition."""
-    return tuple(range(max(first, mode - 1), min(count, mode + 2)))
+def _beside(mode: int, compared: Sequence[int]) -> tuple[int, ...]:
+    """Numbers of a partial's mode and its neighbours, without those that meet their targets by
+    definition."""
+    place = compared.index(mode)
+    return tuple(compared[max(0, place - 1) : place + 2])
 
 
 def _judged(
-    mode: int, own: Array, targets: Array, first: int, search: _Descents | None = None
+    mode: int,
+    own: Array,
+    targets: Array,
+    compared: Sequence[int],
+    search: _Descents | None = None,
 ) -> ModeReach:
     alone = beside = 0.0
     verdict = HAD
     if search is not None and abs(own[mode]) > HAD_CENTS:
-        neighbours = _beside(mode, len(targets), first)
+        neighbours = _beside(mode, compared)
         alone, beside = search.known.least((mode,)), search.known.least(neighbours)
         verdict = NOT_TOGETHER
         if beside > HAD_CENTS:

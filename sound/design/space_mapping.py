@@ -16,10 +16,11 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from solver.files.modes_file import frequencies
+from sound.design.assignment import placed
 from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
 from sound.design.optimisers import descend_finely
-from sound.design.pitch import rms_cents
+from sound.design.pitch import rms_cents, rms_off_partials
 from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 from sound.design.tasks import SearchStep, Trial
@@ -61,7 +62,11 @@ def aimed(objective: Objective, fine: FineModes) -> Objective:
     The clips' residuals are left out, as a search does not use them.
     """
     targets = objective.targets
-    shifted = targets.frequencies * fine.ratios
+    hertz, silent = targets.frequencies, targets.silent
+    if silent is not None:
+        # Otherwise they would be put in another order than they are in.
+        hertz = placed(fine.frequencies, hertz, silent)
+    shifted = hertz * fine.ratios
     order = np.argsort(shifted, kind="stable")
     aims = replace(
         targets,
@@ -69,6 +74,7 @@ def aimed(objective: Objective, fine: FineModes) -> Objective:
         dampings=targets.dampings[order],
         amplitudes=targets.amplitudes[:, order],
         residuals=(),
+        silent=None if silent is None else silent[order],
     )
     return Objective(aims, objective.weights, fine.excess[:, order], objective.absolute)
 
@@ -127,7 +133,7 @@ class SpaceMapping:
     @property
     def _met(self) -> bool:
         assert self.best is not None
-        off = rms_cents(self.best.fine.frequencies, self._objective.targets.frequencies)
+        off = rms_off_partials(self.best.fine.frequencies, self._objective.targets)
         return off <= MET_CENTS
 
     def _checked(self, search: Search, trial: Trial) -> float:
@@ -145,13 +151,13 @@ class SpaceMapping:
         return time.monotonic() - begin
 
     def _entry(self, search: Search, checked: Checked) -> CheckEntry:
-        fine, targets = checked.fine, self._objective.targets.frequencies
+        fine, targets = checked.fine, self._objective.targets
         ratios = fine.ratios if self.best is None else self.best.fine.ratios
         return CheckEntry(
             search.own_seconds,
             search.own_evaluations,
-            rms_cents(np.sort(fine.coarse), targets),
-            rms_cents(fine.frequencies, targets),
+            rms_off_partials(np.sort(fine.coarse), targets),
+            rms_off_partials(fine.frequencies, targets),
             rms_cents(fine.coarse / ratios, fine.frequencies),
             checked.total,
         )

@@ -170,6 +170,8 @@ def fault(design: Design) -> str:
         ("surface vertices", design.surface_vertices, (None, 3)),
         ("surface faces", design.surface_faces, (None, 3)),
     ]
+    if targets.silent is not None:
+        expected.append(("silent modes", targets.silent, (N,)))
     if design.fine is not None:
         expected += [
             ("fine frequencies", design.fine.hertz, (N,)),
@@ -186,10 +188,16 @@ def fault(design: Design) -> str:
         if not _matches(own, shape):
             any_shape = str(shape).replace("None", "any")
             return f"holds {name} of shape {own}, expected {any_shape}"
-    numbers = [(name, data) for name, data, _ in expected if isinstance(data, np.ndarray)]
+    numbers = [
+        (name, data)
+        for name, data, _ in expected
+        if isinstance(data, np.ndarray) and data.dtype != bool
+    ]
     for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
         if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
             return f"holds {name} that are no finite real numbers"
+    if not len(targets.sounding):
+        return "holds silent modes alone"
     if design.fine is not None and sorted(design.fine.order) != list(range(N)):
         return "names other coarse modes of its fine ones than each once"
     if (design.fine_region is None) != (design.model.region is None):

@@ -145,12 +145,22 @@ def _put_targets(group: h5py.Group, targets: Targets) -> None:
     put(group, "dampings", targets.dampings, "1/s", "d of a mode that decays as exp(-d t)")
     put(group, "amplitudes", targets.amplitudes, "full scale", "amplitudes at the strike, per clip")
     put(group, "rates", np.array(targets.rates), "Hz", "sampling rates of the clips")
+    if targets.silent is not None:
+        silent = targets.silent.astype(np.uint8)
+        left_out = np.zeros(0) if targets.left_out is None else targets.left_out
+        put(group, "left_out", left_out, "Hz", "partials that no mode has")
+        group["left_out"].attrs["share_of_loudness"] = targets.left_out_share
+        put(group, "silent", silent, "1", "1 of modes that are no partials and shall not sound")
     for number, residual in enumerate(targets.residuals):
         put(group, f"residuals/{number}", residual, "full scale", "a clip less its modes")
 
 
 def _get_targets(group: h5py.Group) -> Targets:
     names = tuple(str(name) for name in group["names"].asstr()[()])
+    silent, left_out, share = None, None, 0.0
+    if "left_out" in group:
+        silent, left_out = group["silent"][()].astype(bool), group["left_out"][()]
+        share = float(group["left_out"].attrs["share_of_loudness"])
     return Targets(
         names,
         group["frequencies"][()],
@@ -158,6 +168,9 @@ def _get_targets(group: h5py.Group) -> Targets:
         group["amplitudes"][()],
         tuple(group[f"residuals/{number}"][()] for number in range(len(names))),
         tuple(int(rate) for rate in group["rates"][()]),
+        silent,
+        left_out,
+        share,
     )
 
 

@@ -123,8 +123,8 @@ class DampingSettings:
 class Weights:
     """Weights of the parts of the cost (Eq. 4)."""
 
-    frequency: Weight = option(1.0, "weight of the differences of frequencies [1]")
-    amplitude: Weight = option(10.0, "weight of the differences of amplitudes [1]")
+    frequency: Weight = option(10.0, "weight of the differences of frequencies [1]")
+    amplitude: Weight = option(1.0, "weight of the differences of amplitudes [1]")
     regulariser: Weight = option(1e-5, "weight of the roughness of the material [1]")
 
     def __post_init__(self) -> None:

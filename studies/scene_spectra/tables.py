@@ -6,10 +6,10 @@ import numpy as np
 
 from carillon.fem.model import RIGID_MODES
 from solver.files.modes_file import ESTIMATE
+from sound.synthesis.spectral_distance import log_spectral_distance
 from studies.base.table import Column, Row, hidden, table
 from studies.scene_spectra.results import SceneSpectra
 from studies.scene_spectra.scene import RENDERINGS
-from studies.sounds.spectral_distance import log_spectral_distance
 from workflow.variants import TRUTH
 
 

@@ -10,9 +10,9 @@ from sound.design.objective import fall
 from sound.design.pitch import bark, cents, common_factor
 from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
+from sound.synthesis import spectral_distance
 from studies.base.conditions import ONE_COLD_RUN, measured
 from studies.base.table import Column, Row, hidden, table
-from studies.sounds import spectral_distance
 from studies.sounds.results import SoundResults
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from sound.clips.targets import Targets
-from sound.design.pitch import bark, cents, rms_cents
+from sound.design.pitch import bark, cents, rms_off_partials
 from sound.rendering.listening import near_weights
 from sound.rendering.solid import struck_amplitudes
 from studio.binary import pack
@@ -67,7 +67,7 @@ def bank(heard: Heard, positions: Array, aim: Aim | None, header: dict[str, Any]
             "wanted_hertz": target_hertz.tolist(),
             "cents": cents(hertz, target_hertz).tolist(),
             "bark": (bark(hertz) - bark(target_hertz)).tolist(),
-            "rms_cents": rms_cents(hertz, target_hertz),
+            "rms_cents": rms_off_partials(hertz, targets),
         }
     assert dampings is not None
     return pack(

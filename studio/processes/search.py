@@ -18,6 +18,7 @@ from sound.design.search import HistoryEntry, Search
 from sound.design.tasks import SearchStep
 from sound.project.design import HISTORY, HISTORY_TYPE
 from sound.project.design_file import read_design, write_design
+from sound.rendering.verdict import with_verdict
 
 Tell = Callable[[dict[str, Any]], None]
 
@@ -52,9 +53,11 @@ class SearchProcess:
                 coordinates=None if coordinates is None else np.asarray(coordinates),
                 history=None if coordinates is None else history_of(rows),
             )
+        design = with_verdict(design)
         write_design(out, design)
         z = design.coordinates.tolist()
-        return {"design": out, "z": z, "rows": rows_of(design.history)}
+        verdict = design.evidence.get("verdict")
+        return {"design": out, "z": z, "rows": rows_of(design.history), "verdict": verdict}
 
 
 class _News:

@@ -26,7 +26,7 @@ from solver.response.vertices import inward_normals
 from sound.design.descent import cost_of
 from sound.design.fine_check import FINE_TOLERANCE
 from sound.design.optimise import optimise
-from sound.design.pitch import common_factor
+from sound.design.pitch import stretch_to
 from sound.design.preparation import (
     DesignProblem,
     PreparedSolid,
@@ -222,8 +222,8 @@ class SolidProcess:
             assert self._problem is not None
             objective = self._problem.setting.objective
             if not objective.absolute:
-                stretch = common_factor(np.sort(own), aim.targets.frequencies)
-                own, young = stretch * own, stretch**2 * young
+                factor = stretch_to(np.sort(own), aim.targets)
+                own, young = factor * own, factor**2 * young
             keys.setdefault("cost", cost_of(objective, material, evaluation).total)
         pushed = sounding.pushed(sounding.model, elastic, self._inward)
         heard = Heard(own, dampings, pushed, self._at_vertices(young))

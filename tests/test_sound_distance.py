@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sound.synthesis.sinusoids import damped_sinusoids
-from studies.sounds.spectral_distance import FLOOR_DECIBELS, log_spectral_distance
+from sound.synthesis.spectral_distance import FLOOR_DECIBELS, log_spectral_distance
 
 RATES = (16_000, 44_100, 48_000)
 
