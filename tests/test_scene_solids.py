@@ -6,7 +6,7 @@ import trimesh
 
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
-from sound.scenes.bodies import bodies_of
+from sound.scenes.bodies import bodies_of, with_modes
 from tests.scenes import scene
 from tests.theories import plate_frequencies, rod_frequencies
 
@@ -15,7 +15,7 @@ ALUMINIUM = {"material": "aluminium"}
 
 def body(**given):
     """The one object of a scene."""
-    (found,) = bodies_of(scene({"name": "it", **given}).objects)
+    (found,) = with_modes(bodies_of(scene({"name": "it", **given}).objects))
     return found
 
 
@@ -75,7 +75,7 @@ def test_modes_are_found_once_for_all_sizes_and_materials_of_one_ratio(monkeypat
             for unit, pitch in ((1.0, None), (2.0, None), (1.0, 700.0))
         ]
     )
-    bodies = bodies_of(described.objects)
+    bodies = with_modes(bodies_of(described.objects))
     assert len(solved) == 1
     first, twice, pitched = (each.solid.frequencies[0] for each in bodies)
     assert twice == pytest.approx(first / 2.0) and pitched == pytest.approx(700.0, rel=1e-4)

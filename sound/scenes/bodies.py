@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,15 +19,19 @@ from sound.rendering.solid import SoundingSolid
 from sound.scenes.convex import convex_parts, hull_of
 from sound.scenes.divided import parts_of_one
 from sound.scenes.hertz import compliance
-from sound.scenes.object_solid import ObjectSolid, object_solid
+from sound.scenes.object_solid import ObjectSolid, Sounding, object_solid
 from sound.scenes.scene import ObjectEntry
 
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""
 Y_UP = (".gltf", ".glb")
 """Endings of mesh files whose y points up.  In all other files z is taken to point up."""
-_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Rotation from axes whose y points up to axes whose z does (glTF 2.0, section 3.4)."""
+_TO_Z = {
+    "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "z": None,
+}
+"""Rotations to axes whose z points up, by the axis that points up (y: glTF 2.0, section 3.4)."""
 SHARPEST = 5e-4
 """Least radius of curvature [m]: edges of things are rounded by use."""
 SMOOTHINGS = 2
@@ -128,17 +133,30 @@ class Body:
     """Number of the material of each part."""
     volume: float
     """float [m^3]: volume of the material."""
-    solid: SoundingSolid | None
-    listening: Listening | None
-    """Modes, None if the body is silent; loudness and noise of a design's clips, None without."""
+    find: Callable[[], Sounding] | None
+    """Finds how the body sounds, see `with_modes`; None if it is silent."""
     radius: float | None
     """float [m] or None: radius of a ball, None for any other body."""
     turn: Array | None
     """(3, 3) or None: rotation from the coordinates of the solid to the body's own axes; None if
     they agree."""
-    accuracy: dict[str, Any] | None
-    """dict or None: expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`, if
-    known."""
+    sounding: Sounding | None = None
+    """Its modes, once they are found; None if it is silent."""
+
+    @property
+    def solid(self) -> SoundingSolid | None:
+        """Its modes, None if it is silent."""
+        return None if self.sounding is None else self.sounding.solid
+
+    @property
+    def listening(self) -> Listening | None:
+        """Loudness and noise of a design's clips, None without."""
+        return None if self.sounding is None else self.sounding.listening
+
+    @property
+    def accuracy(self) -> dict[str, Any] | None:
+        """Expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`, if known."""
+        return None if self.sounding is None else self.sounding.accuracy
 
     def motion(self, places: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] in each mode at places (p, 3) [m], in own axes."""
@@ -165,16 +183,22 @@ class Body:
 
 
 def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
-    """The bodies of all objects; objects that differ in name and motion alone share their modes.
+    """The bodies of all objects, without their modes; see `with_modes`.
 
-    Raises the errors of `body_of`.
+    Objects that differ in name and motion alone share their modes.  Raises the errors of `body_of`.
     """
     origin = (0.0, 0.0, 0.0)
     made: dict[ObjectEntry, Body] = {}
     bodies = []
     for entry in objects:
         alike = replace(
-            entry, name="any", position=origin, rotation=origin, velocity=origin, spin=origin
+            entry,
+            name="any",
+            position=origin,
+            rotation=origin,
+            velocity=origin,
+            spin=origin,
+            stands_on=None,
         )
         if alike not in made:
             made[alike] = body_of(entry)
@@ -183,20 +207,16 @@ def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
 
 
 def body_of(entry: ObjectEntry) -> Body:
-    """The body of an object.
+    """The body of an object, without its modes.
 
-    Raises UserError if a file is missing or unusable, or a solid has no mass or no modes, and
-    ConvergenceError if the modes were not found; both name the object.
+    Raises UserError if a file is missing or unusable, or a solid has no mass, and ConvergenceError
+    if the modes that tell the size of an object with a pitch were not found; both name the object.
     """
-    try:
+    with _naming(entry):
         solid = object_solid(entry)
         if solid.is_held and not entry.fixed:
             raise UserError("is held, so it cannot move; add fixed: true")
         body = _upright_body(entry, solid)
-    except UserError as error:
-        raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
-    except ConvergenceError as error:
-        raise ConvergenceError(f"object {entry.name!r}: {error}") from None
     if not body.mass > LIGHTEST:
         raise UserError(
             f"object {entry.name!r}: has a mass of {body.mass:.3g} kg, expected more than "
@@ -205,13 +225,40 @@ def body_of(entry: ObjectEntry) -> Body:
     return body
 
 
+def with_modes(bodies: Sequence[Body]) -> list[Body]:
+    """The bodies with their modes, found once for those that share them.
+
+    Raises UserError if there are none, and ConvergenceError if they were not found; both name the
+    object.
+    """
+    found: dict[Callable[[], Sounding], Sounding] = {}
+    for body in bodies:
+        if body.find is not None and body.find not in found:
+            with _naming(body.entry):
+                found[body.find] = body.find()
+    return [
+        body if body.find is None else replace(body, sounding=found[body.find]) for body in bodies
+    ]
+
+
+@contextmanager
+def _naming(entry: ObjectEntry) -> Iterator[None]:
+    """Let errors name an object."""
+    try:
+        yield
+    except UserError as error:
+        raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
+    except ConvergenceError as error:
+        raise ConvergenceError(f"object {entry.name!r}: {error}") from None
+
+
 def _in_keys(sentence: str) -> str:
     """A sentence about an option of commands, with the key of a scene in its place."""
     return sentence.replace("--components largest", "components: largest")
 
 
 def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
-    rigid, turn = solid.rigid, upright(solid.mesh)
+    rigid, turn = solid.rigid, upright(solid.mesh, entry.up)
     inertia = (rigid.axes * rigid.moments) @ rigid.axes.T
     shape = Shape.of_surface(solid.vertices, solid.faces, rigid.centre, solid.radius)
     if turn is not None:
@@ -228,7 +275,6 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
     if solid.which is not None:
         which = np.asarray(solid.which)
         parts, of_parts = parts_of_one(parts, shape.vertices, which)
-    density = entry.made_of.density if solid.sounding is None else solid.sounding.model.density
     return Body(
         entry,
         rigid.mass,
@@ -240,23 +286,27 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         which,
         parts,
         tuple(of_parts),
-        rigid.mass / density if solid.volume is None else solid.volume,
-        solid.sounding,
-        solid.listening,
+        solid.volume,
+        solid.find,
         solid.radius,
         turn,
-        solid.accuracy,
     )
 
 
-def upright(mesh: str) -> Array | None:
+def upright(mesh: str, up: str = "auto") -> Array | None:
     """Rotation (3, 3) from the coordinates of a mesh file to axes whose z points up, None if none.
+
+    The axis `up` of the file points up: x, y or z, or "auto", which is y of glTF and z of others.
 
     Examples
     --------
     >>> upright("bar.GLB") @ [0.0, 1.0, 0.0]
     array([0., 0., 1.])
-    >>> upright("bar.obj") is None
-    True
+    >>> upright("bar.obj") is None, upright("bar.glb", "z") is None
+    (True, True)
+    >>> upright("bar.obj", "x") @ [1.0, 0.0, 0.0]
+    array([0., 0., 1.])
     """
-    return _Y_TO_Z if Path(mesh).suffix.lower() in Y_UP else None
+    if up == "auto":
+        up = "y" if Path(mesh).suffix.lower() in Y_UP else "z"
+    return _TO_Z[up]
