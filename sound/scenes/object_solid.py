@@ -93,12 +93,13 @@ def object_solid(entry: ObjectEntry) -> ObjectSolid:
         return _of_modes(entry, entry.modes, entry.heard_modes)
     if entry.radius is not None:
         return _of_ball(entry, entry.radius)
-    assert entry.mesh is not None
+    mesh = entry.mesh
+    assert mesh is not None
     if entry.size is not None:
-        entry = _in_metres(entry, entry.mesh, entry.size)
+        entry = _in_metres(entry, mesh, entry.size)
     if entry.regions or entry.supports:
-        return _of_parts(entry, entry.mesh)
-    return _of_mesh(entry, entry.mesh)
+        return _of_parts(entry, mesh)
+    return _of_mesh(entry, mesh)
 
 
 def _in_metres(entry: ObjectEntry, mesh: str, size: float) -> ObjectEntry:

@@ -32,7 +32,6 @@ from solver.refinement.errors import (
     DIVIDED_CELLS,
     FROM_SOLID,
     LAST,
-    ExpectedErrors,
     RefinementStep,
 )
 from solver.refinement.model_solver import SolveByOptions

@@ -17,6 +17,7 @@ from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError, one_line
 from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactLog, ContactPoints
+from sound.scenes.contact.standing import stood
 from sound.scenes.contact.start import start
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import Motion
@@ -75,7 +76,8 @@ def simulate(
 ) -> Course:
     """Simulate the motion of bodies for some seconds under gravity (3,) [m/s^2].
 
-    Bodies that overlap a little at the start are separated, see `sound.scenes.contact.start`.
+    Those that stand on something are put there, see `sound.scenes.contact.standing`, and those that
+    overlap a little at the start are separated, see `sound.scenes.contact.start`.
     Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the masses,
     and leaves the share of speed that the restitution says.  Bodies that lie still sleep.  Raises
     UserError if two bodies overlap much at the start, the simulation is unstable, or there are too
@@ -83,6 +85,9 @@ def simulate(
     """
     mujoco = loaded()
     model = _model(mujoco, bodies, engine, gravity, ground)
+    if any(body.entry.stands_on for body in bodies):
+        bodies = stood(model, bodies, ground.height)
+        model = _model(mujoco, bodies, engine, gravity, ground)
     data = mujoco.MjData(model)
     moved = start(data, bodies, gravity, engine.contact_seconds)
     recorder = _Recorder(model, data, bodies)
