@@ -17,6 +17,7 @@ from carillon.errors import ConvergenceError, UserError
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.convex import convex_parts, hull_of
+from sound.scenes.cylinder import Cylinder, cylinder_of
 from sound.scenes.divided import parts_of_one
 from sound.scenes.hertz import compliance
 from sound.scenes.object_solid import ObjectSolid, Sounding, object_solid
@@ -131,6 +132,8 @@ class Body:
     for a ball."""
     of_parts: tuple[int, ...]
     """Number of the material of each part."""
+    cylinder: Cylinder | None
+    """The cylinder in place of its only part, None if it is none."""
     volume: float
     """float [m^3]: volume of the material."""
     find: Callable[[], Sounding] | None
@@ -286,6 +289,7 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         which,
         parts,
         tuple(of_parts),
+        cylinder_of(parts[0]) if len(parts) == 1 else None,
         solid.volume,
         solid.find,
         solid.radius,

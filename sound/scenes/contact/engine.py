@@ -19,6 +19,7 @@ from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactLog, ContactPoints
 from sound.scenes.contact.standing import stood
 from sound.scenes.contact.start import start
+from sound.scenes.cylinder import Cylinder
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import Motion
 from sound.scenes.scene import EngineEntry, Vector
@@ -167,10 +168,25 @@ def _add_body(mujoco: ModuleType, spec: Any, engine: EngineEntry, number: int, b
     if body.radius is not None:
         size = [body.radius, 0.0, 0.0]
         added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **contacts[0])
+    if body.cylinder is not None:
+        _add_cylinder(mujoco, added, body.cylinder, contacts[body.of_parts[0]])
+        return
     for part, (corners, material) in enumerate(zip(body.parts, body.of_parts)):
         name = f"{number} {part}"
         spec.add_mesh(name=name, uservert=corners.ravel().tolist())
         added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **contacts[material])
+
+
+def _add_cylinder(
+    mujoco: ModuleType, added: Any, cylinder: Cylinder, contact: dict[str, Any]
+) -> None:
+    added.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        pos=cylinder.centre.tolist(),
+        zaxis=cylinder.axis.tolist(),
+        size=[cylinder.radius, cylinder.half_length, 0.0],
+        **contact,
+    )
 
 
 def _contact_options(engine: EngineEntry, friction: float, restitution: float) -> dict[str, Any]:
