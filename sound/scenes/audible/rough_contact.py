@@ -32,8 +32,8 @@ RESOLVED = 0.25
 YIELDING = 0.4
 """Approach by which the force of a rough contact falls to 1 / e, over the height (rms) of the
 roughness."""
-MOST_STEPS = 64
-"""Most steps in one sample."""
+FEWEST_STEPS, MOST_STEPS = 4, 64
+"""Fewest and most steps in one sample."""
 REACH = 4.0
 """Greatest height of the body, over that of roughness and approach together: the engine follows
 larger hops."""
@@ -69,7 +69,7 @@ def relative_force(
     """
     depths = approach(forces, radius, modulus) + 1.5 * YIELDING * within
     fastest = float(np.sqrt((1.5 * forces / depths).max() / mass))
-    steps = int(np.clip(np.ceil(fastest / (RESOLVED * rate)), 1, MOST_STEPS))
+    steps = int(np.clip(np.ceil(fastest / (RESOLVED * rate)), FEWEST_STEPS, MOST_STEPS))
     most = REACH * (float(np.abs(heights).max(initial=0.0)) + float(depths.max()))
     losses = dashpots / forces
     return np.asarray(_follow(heights, forces, depths, losses, mass, 1.0 / rate, steps, most))
