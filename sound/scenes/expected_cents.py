@@ -23,15 +23,14 @@ def cents(share: float) -> float:
 
 
 def in_cents(accuracy: Mapping[str, Any] | None) -> dict[str, float]:
-    """Expected error of a body's frequencies [cents], root mean square and worst; {} if unknown.
+    """Expected error of a body's frequencies [cents], root mean square and worst, as far as known.
 
     `accuracy` is that of `sound.scenes.solved.SolvedSolid`. What is positive is too high.
     """
-    if not accuracy or f"{FROM_SOLID}_rms" not in accuracy:
-        return {}
     return {
         f"expected_cents_{kind}": round(cents(accuracy[f"{FROM_SOLID}_{kind}"]), 2)
         for kind in ("rms", "worst")
+        if accuracy and f"{FROM_SOLID}_{kind}" in accuracy
     }
 
 
@@ -47,7 +46,7 @@ def told(accuracy: Mapping[str, Any] | None) -> str:
     "how far its frequencies are from the solid's is not known"
     """
     known = in_cents(accuracy)
-    if not known:
+    if len(known) < 2:
         return UNKNOWN
     sentence = (
         f"expected error {known['expected_cents_rms']:.2g} cents rms, worst "
