@@ -25,7 +25,7 @@ from carillon.fem.regions import Regions
 from solver.analysis.library import solve
 from solver.response.points import interpolation
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, radiated
-from sound.scenes.bodies import Shape
+from sound.scenes.shape import Shape
 from sound.strikes import struck_surface
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from sound.scenes.bodies import Body, bodies_of
+from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.contact.engine import Course, GroundPlane, simulate
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact, Touch, split_impacts
 from sound.scenes.scene import Scene, scene_of
@@ -31,7 +31,7 @@ def scene(*objects: dict[str, Any], **given: Any) -> Scene:
 
 def moved(described: Scene) -> tuple[list[Body], Course]:
     """Its bodies, and their motion."""
-    bodies = bodies_of(described.objects)
+    bodies = with_modes(bodies_of(described.objects))
     ground = GroundPlane(described.ground, described.ground_material)
     return bodies, simulate(
         bodies, described.seconds, described.engine, described.gravity, ground, visible=False

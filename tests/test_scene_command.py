@@ -78,5 +78,5 @@ def test_the_summary_tells_the_distance_and_what_was_moved(folder, capsys):
     (folder / "scene.yaml").write_text(described)
     assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
     told = capsys.readouterr()
-    assert "expected distance from the solid, of 'bar' of frequencies 7 to 12: " in told.out
+    assert "\nbar: 6 modes from " in told.out and " cents rms, worst +" in told.out
     assert "object 'marble' by 0.05 mm to [0.3, 0, 0.01]" in told.err

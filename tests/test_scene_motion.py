@@ -163,7 +163,7 @@ def test_a_start_at_which_two_overlap_is_refused():
         moved(described)
     with pytest.raises(UserError, match="object 'one' and the ground overlap by 10 mm") as refused:
         moved(scene(ball("one")))
-    assert str(refused.value).endswith("rests on it at a height (z) of 0.01 m")
+    assert str(refused.value).endswith("with stands_on: ground, or at a height (z) of 0.01 m")
 
 
 def bowl(height):

@@ -12,7 +12,7 @@ from sound.scenes.audible.loudness import (
     equivalent_radius,
 )
 from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, Radiation, radiated
-from sound.scenes.bodies import Shape
+from sound.scenes.shape import Shape
 from tests.radiation_bem import approximate_power, level, sphere_pressure, vibrating_solid
 
 RADIUS = 0.05

@@ -6,7 +6,7 @@ import trimesh
 
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
-from sound.scenes.bodies import bodies_of
+from sound.scenes.bodies import bodies_of, with_modes
 from tests.scenes import scene
 from tests.theories import plate_frequencies, rod_frequencies
 
@@ -15,7 +15,7 @@ ALUMINIUM = {"material": "aluminium"}
 
 def body(**given):
     """The one object of a scene."""
-    (found,) = bodies_of(scene({"name": "it", **given}).objects)
+    (found,) = with_modes(bodies_of(scene({"name": "it", **given}).objects))
     return found
 
 
@@ -63,11 +63,11 @@ def test_size_modulus_and_density_are_those_of_a_solid_that_is_solved_so(tmp_pat
 
 
 def test_modes_are_found_once_for_all_sizes_and_materials_of_one_ratio(monkeypatch):
-    import solver.analysis.library as library
+    import sound.scenes.solved as solid
 
     solved = []
-    solve = library.solve
-    monkeypatch.setattr(library, "solve", lambda *a, **k: solved.append(1) or solve(*a, **k))
+    solve = solid.solve_refined
+    monkeypatch.setattr(solid, "solve_refined", lambda *a, **k: solved.append(1) or solve(*a, **k))
     given = {"mesh": "builtin:bar", "count": 2, "resolution": 9, "collision": "hull"}
     described = scene(
         *[
@@ -75,7 +75,7 @@ def test_modes_are_found_once_for_all_sizes_and_materials_of_one_ratio(monkeypat
             for unit, pitch in ((1.0, None), (2.0, None), (1.0, 700.0))
         ]
     )
-    bodies = bodies_of(described.objects)
+    bodies = with_modes(bodies_of(described.objects))
     assert len(solved) == 1
     first, twice, pitched = (each.solid.frequencies[0] for each in bodies)
     assert twice == pytest.approx(first / 2.0) and pitched == pytest.approx(700.0, rel=1e-4)
@@ -86,6 +86,7 @@ def test_what_was_found_before_is_the_same_to_the_last_bit():
     first, again = (body(**given, collision="hull") for _ in range(2))
     assert np.array_equal(first.solid.frequencies, again.solid.frequencies)
     assert np.array_equal(first.solid.modes, again.solid.modes)
+    assert first.mass == again.mass and np.array_equal(first.inertia, again.inertia)
     assert first.accuracy == again.accuracy
 
 
@@ -108,16 +109,16 @@ def test_voxels_are_as_they_were_and_told_how_far_off_they_are(count):
 
 
 def test_the_modes_are_found_where_the_distance_cannot_be_told(monkeypatch, capsys):
-    import sound.scenes.solved as solved
+    import solver.accuracy.divide as divide
 
     def fails(*_):
         raise FloatingPointError("a fault")
 
-    monkeypatch.setattr(solved, "estimate_cell_errors", fails)
+    monkeypatch.setattr(divide, "estimate_cell_errors", fails)
     found = body(mesh="builtin:bar", material="glass", count=2, resolution=9, collision="hull")
     assert len(found.solid.frequencies) == 2
     assert found.accuracy == {"discretisation": "finite-cell", "resolution": 9}
-    assert "cannot be told: a fault" in capsys.readouterr().err
+    assert "cannot be told: FloatingPointError: a fault" in capsys.readouterr().err
 
 
 def test_refusals_name_keys_of_a_scene_and_what_helps(tmp_path):
@@ -227,3 +228,41 @@ def test_one_motion_is_heard_by_the_modes_of_either_file(tmp_path):
     assert np.abs(fine.sound - coarse.sound).max() > 0.01 * np.abs(fine.sound).max()
     with pytest.raises(UserError, match="is of another solid"):
         body(**{**given, "name": "it", "heard_modes": files[2]})
+
+
+def test_a_rod_is_as_near_as_modes_of_an_accuracy_and_told_in_cents(tmp_path):
+    from sound.scenes.expected_cents import in_cents
+
+    rod = written(trimesh.creation.cylinder(0.01, 0.25, sections=32), tmp_path / "rod.obj")
+    rough = body(mesh=rod, **ALUMINIUM, count=40, accuracy=None)
+    found = body(mesh=rod, **ALUMINIUM, count=40)
+    assert rough.accuracy["divided_cells"] == 0 < found.accuracy["divided_cells"]
+    assert found.accuracy["solid_frequency_error_rms"] < 0.01
+    assert "missed_accuracy" not in found.accuracy
+    material = found.entry.made_of
+    bending = rod_frequencies(0.25, 0.01, material.young, material.poisson, material.density)
+    bent = found.solid.frequencies[[0, 2, 5]]  # the fifth twists
+    cents = 1200.0 * np.log2(bent / np.asarray(bending)[:3])
+    assert np.abs(cents).max() < 10.0
+    told = in_cents(found.accuracy)
+    assert 0.0 < told["expected_cents_rms"] < 17.3 < 52.0
+    assert in_cents(None) == {}
+    # As a rigid body it is the same however its cells are divided.
+    assert (found.mass, found.inertia.tolist()) == (rough.mass, rough.inertia.tolist())
+
+
+def test_a_mesh_has_the_size_and_the_axis_up_that_it_is_given(tmp_path):
+    bar = written(block(40.0, 2.0, 10.0), tmp_path / "bar.obj")
+    found = body(mesh=bar, material="steel", count=0, size=0.2, up="y", resolution=12)
+    assert np.ptp(found.shape.vertices, axis=0) == pytest.approx([0.2, 0.05, 0.01])
+    assert found.mass == pytest.approx(7850.0 * 0.2 * 0.05 * 0.01, rel=0.02)
+    with pytest.raises(UserError, match="leave out the unit"):
+        body(mesh=bar, material="steel", size=0.2, unit=0.1)
+    with pytest.raises(UserError, match="leave out the size"):
+        body(mesh=bar, material="steel", size=0.2, pitch=440.0)
+    with pytest.raises(UserError, match="size goes with mesh, found a radius"):
+        body(radius=0.1, material="steel", size=0.2)
+    along = body(mesh=bar, material="steel", count=0, size=0.2, up="x", resolution=12)
+    assert np.ptp(along.shape.vertices, axis=0) == pytest.approx([0.01, 0.05, 0.2])
+    plain = body(mesh=bar, material="steel", count=0, size=0.2, resolution=12)
+    assert np.ptp(plain.shape.vertices, axis=0) == pytest.approx([0.2, 0.01, 0.05])

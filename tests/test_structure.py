@@ -106,11 +106,11 @@ ARROWS = {
     "studio": "",
     "studio.server": "sound.project studio",
     "studio.standalone": "solver.response sound.design sound.project sound.rendering studio",
-    "studio.scene": "solver.refinement sound.scenes studio studio.standalone",
+    "studio.scene": "sound.scenes studio studio.standalone",
     "studio.processes": """solver.analysis solver.files solver.response sound sound.clips
         sound.design sound.export sound.project sound.rendering studio studio.standalone""",
     "studio.session": "sound sound.clips sound.project studio studio.processes",
-    "studio.commands": """solver.refinement sound sound.clips sound.export sound.project
+    "studio.commands": """sound sound.clips sound.export sound.project
         sound.scenes sound.scenes.film sound.scenes.playing studio.scene studio.server
         studio.session studio.standalone""",
     #

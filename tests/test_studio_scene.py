@@ -216,7 +216,7 @@ def test_opens_from_a_file_and_asks_for_nothing(shown):
     bodies = shown.locator("#bodies .body").all_inner_texts()
     assert [text.split("\n") for text in bodies] == [
         ["ball", "3 modes from 880 Hz"],
-        ["block", "4 modes from 312 Hz, about 1.2 % off"],
+        ["block", "4 modes from 312 Hz, about 21 cents off"],
         ["cone", "silent"],
     ]
     from PIL import Image

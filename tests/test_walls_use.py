@@ -19,7 +19,7 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.files.modes_file import read_modes
 from sound.design.preparation import prepared_solid
 from sound.project.project import project_of
-from sound.scenes.bodies import bodies_of
+from sound.scenes.bodies import bodies_of, with_modes
 from studio.processes.composition import PlacingProcess
 from studio.processes.solid import SolidProcess
 from tests.scenes import scene
@@ -187,7 +187,7 @@ def test_a_sheet_in_a_scene_sounds_as_a_thin_plate(tmp_path):
     trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(file)
     given = {"name": "it", "mesh": str(file), "unit": 0.001, "material": "steel", "count": 3}
     described = scene({**given, "wall": "0.8 mm", "resolution": 20, "collision": "hull"})
-    (found,) = bodies_of(described.objects)
+    (found,) = with_modes(bodies_of(described.objects))
     material = found.entry.made_of
     wanted = plate_frequencies(0.2, 0.0008, material.young, material.density)[0]
     assert found.solid.frequencies[0] == pytest.approx(wanted, rel=0.02)

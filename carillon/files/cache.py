@@ -45,13 +45,11 @@ def remembered(
         Read and write an entry (HDF5).  Errors of the file are raised as UserError or OSError;
         what is read is checked as if a user had given it.
     """
+    kept = recalled(kind, key, read)
+    if kept is not None:
+        return kept
     folder = folder_of(kind)
     path = folder / f"{key}.h5"
-    with suppress(UserError, OSError):
-        if _is_private(folder, stat.S_ISDIR) and _is_private(path, stat.S_ISREG):
-            kept = read(path)
-            os.utime(path)
-            return kept
     result = find()
     if folder.is_absolute():  # else the user has no home
         with suppress(UserError, OSError):
@@ -63,6 +61,18 @@ def remembered(
             path.chmod(0o600)  # whatever the user lets others do with other files
             _make_room(folder)
     return result
+
+
+def recalled(kind: str, key: str, read: Callable[[Path], Found]) -> Found | None:
+    """What was found before, or None; see `remembered`."""
+    folder = folder_of(kind)
+    path = folder / f"{key}.h5"
+    with suppress(UserError, OSError):
+        if _is_private(folder, stat.S_ISDIR) and _is_private(path, stat.S_ISREG):
+            kept = read(path)
+            os.utime(path)
+            return kept
+    return None
 
 
 def folder_of(kind: str) -> Path:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from carillon.arrays import Array, Integers
 from carillon.composition.materials import NamedMaterial
@@ -16,83 +16,23 @@ from carillon.errors import ConvergenceError, UserError
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.convex import convex_parts, hull_of
+from sound.scenes.cylinder import Cylinder, cylinder_of
 from sound.scenes.divided import parts_of_one
 from sound.scenes.hertz import compliance
-from sound.scenes.object_solid import ObjectSolid, object_solid
+from sound.scenes.object_solid import ObjectSolid, Sounding, object_solid
 from sound.scenes.scene import ObjectEntry
+from sound.scenes.shape import Shape
 
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""
 Y_UP = (".gltf", ".glb")
 """Endings of mesh files whose y points up.  In all other files z is taken to point up."""
-_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Rotation from axes whose y points up to axes whose z does (glTF 2.0, section 3.4)."""
-SHARPEST = 5e-4
-"""Least radius of curvature [m]: edges of things are rounded by use."""
-SMOOTHINGS = 2
-"""Number of times that the curvature at each vertex is averaged with its neighbours'."""
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A surface of vertices (V, 3) [m] and triangles (F, 3) in an object's own axes, from its
-    centre of mass.
-
-    At the vertices, `inward` (V, 3) are unit vectors into the solid, and `radii` (V,) [m] those of
-    curvature.
-    """
-
-    vertices: Array
-    faces: Integers
-    inward: Array
-    radii: Array
-
-    @classmethod
-    def of_surface(
-        cls, vertices: Array, faces: Integers, centre: Array, radius: float | None = None
-    ) -> Shape:
-        """The shape of a surface about a centre (3,) [m]; `radius` [m] is that of a ball."""
-        import trimesh
-
-        from solver.response.vertices import inward_normals
-
-        surface = trimesh.Trimesh(vertices, faces, process=False)
-        inward = inward_normals(surface, vertices)
-        if radius is not None:
-            radii = np.full(len(vertices), radius)
-        else:
-            radii = vertex_radii(vertices, faces, inward)
-        return cls(vertices - centre, faces, inward, radii)
-
-
-def vertex_radii(vertices: Array, faces: Integers, normals: Array) -> Array:
-    """Radii of curvature (V,) [m], from the angles between the normals of neighbouring vertices.
-
-    They lie between `SHARPEST` and half of the longest side, which stands for flat.
-    """
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    first, second = edges.T
-    long = np.maximum(np.linalg.norm(vertices[first] - vertices[second], axis=1), 1e-12)
-    turned = np.linalg.norm(normals[first] - normals[second], axis=1)
-    curvature = _mean_at(first, second, turned / long, turned / long, len(vertices))
-    for _ in range(SMOOTHINGS):
-        near = _mean_at(first, second, curvature[second], curvature[first], len(vertices))
-        curvature = 0.5 * (curvature + near)
-    widest = 0.5 * float(np.ptp(vertices, axis=0).max())
-    return np.clip(1.0 / np.maximum(curvature, 1e-12), min(SHARPEST, widest), widest)
-
-
-def _mean_at(
-    first: NDArray[np.integer],
-    second: NDArray[np.integer],
-    to_first: Array,
-    to_second: Array,
-    n: int,
-) -> Array:
-    """Mean (n,) at each vertex of the values that its edges have for their first or second end."""
-    ends = np.concatenate([first, second])
-    sums = np.bincount(ends, np.concatenate([to_first, to_second]), n)
-    return np.asarray(sums / np.maximum(np.bincount(ends, minlength=n), 1))
+_TO_Z = {
+    "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "z": None,
+}
+"""Rotations to axes whose z points up, by the axis that points up (y: glTF 2.0, section 3.4)."""
 
 
 @dataclass(frozen=True)
@@ -126,19 +66,34 @@ class Body:
     for a ball."""
     of_parts: tuple[int, ...]
     """Number of the material of each part."""
+    cylinder: Cylinder | None
+    """The cylinder in place of its only part, None if it is none."""
     volume: float
     """float [m^3]: volume of the material."""
-    solid: SoundingSolid | None
-    listening: Listening | None
-    """Modes, None if the body is silent; loudness and noise of a design's clips, None without."""
+    find: Callable[[], Sounding] | None
+    """Finds how the body sounds, see `with_modes`; None if it is silent."""
     radius: float | None
     """float [m] or None: radius of a ball, None for any other body."""
     turn: Array | None
     """(3, 3) or None: rotation from the coordinates of the solid to the body's own axes; None if
     they agree."""
-    accuracy: dict[str, Any] | None
-    """dict or None: expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`, if
-    known."""
+    sounding: Sounding | None = None
+    """Its modes, once they are found; None if it is silent."""
+
+    @property
+    def solid(self) -> SoundingSolid | None:
+        """Its modes, None if it is silent."""
+        return None if self.sounding is None else self.sounding.solid
+
+    @property
+    def listening(self) -> Listening | None:
+        """Loudness and noise of a design's clips, None without."""
+        return None if self.sounding is None else self.sounding.listening
+
+    @property
+    def accuracy(self) -> dict[str, Any] | None:
+        """Expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`, if known."""
+        return None if self.sounding is None else self.sounding.accuracy
 
     def motion(self, places: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] in each mode at places (p, 3) [m], in own axes."""
@@ -165,16 +120,22 @@ class Body:
 
 
 def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
-    """The bodies of all objects; objects that differ in name and motion alone share their modes.
+    """The bodies of all objects, without their modes; see `with_modes`.
 
-    Raises the errors of `body_of`.
+    Objects that differ in name and motion alone share their modes.  Raises the errors of `body_of`.
     """
     origin = (0.0, 0.0, 0.0)
     made: dict[ObjectEntry, Body] = {}
     bodies = []
     for entry in objects:
         alike = replace(
-            entry, name="any", position=origin, rotation=origin, velocity=origin, spin=origin
+            entry,
+            name="any",
+            position=origin,
+            rotation=origin,
+            velocity=origin,
+            spin=origin,
+            stands_on=None,
         )
         if alike not in made:
             made[alike] = body_of(entry)
@@ -183,20 +144,16 @@ def bodies_of(objects: Sequence[ObjectEntry]) -> list[Body]:
 
 
 def body_of(entry: ObjectEntry) -> Body:
-    """The body of an object.
+    """The body of an object, without its modes.
 
-    Raises UserError if a file is missing or unusable, or a solid has no mass or no modes, and
-    ConvergenceError if the modes were not found; both name the object.
+    Raises UserError if a file is missing or unusable, or a solid has no mass, and ConvergenceError
+    if the modes that tell the size of an object with a pitch were not found; both name the object.
     """
-    try:
+    with _naming(entry):
         solid = object_solid(entry)
         if solid.is_held and not entry.fixed:
             raise UserError("is held, so it cannot move; add fixed: true")
         body = _upright_body(entry, solid)
-    except UserError as error:
-        raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
-    except ConvergenceError as error:
-        raise ConvergenceError(f"object {entry.name!r}: {error}") from None
     if not body.mass > LIGHTEST:
         raise UserError(
             f"object {entry.name!r}: has a mass of {body.mass:.3g} kg, expected more than "
@@ -205,13 +162,40 @@ def body_of(entry: ObjectEntry) -> Body:
     return body
 
 
+def with_modes(bodies: Sequence[Body]) -> list[Body]:
+    """The bodies with their modes, found once for those that share them.
+
+    Raises UserError if there are none, and ConvergenceError if they were not found; both name the
+    object.
+    """
+    found: dict[Callable[[], Sounding], Sounding] = {}
+    for body in bodies:
+        if body.find is not None and body.find not in found:
+            with _naming(body.entry):
+                found[body.find] = body.find()
+    return [
+        body if body.find is None else replace(body, sounding=found[body.find]) for body in bodies
+    ]
+
+
+@contextmanager
+def _naming(entry: ObjectEntry) -> Iterator[None]:
+    """Let errors name an object."""
+    try:
+        yield
+    except UserError as error:
+        raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
+    except ConvergenceError as error:
+        raise ConvergenceError(f"object {entry.name!r}: {error}") from None
+
+
 def _in_keys(sentence: str) -> str:
     """A sentence about an option of commands, with the key of a scene in its place."""
     return sentence.replace("--components largest", "components: largest")
 
 
 def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
-    rigid, turn = solid.rigid, upright(solid.mesh)
+    rigid, turn = solid.rigid, upright(solid.mesh, entry.up)
     inertia = (rigid.axes * rigid.moments) @ rigid.axes.T
     shape = Shape.of_surface(solid.vertices, solid.faces, rigid.centre, solid.radius)
     if turn is not None:
@@ -228,7 +212,6 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
     if solid.which is not None:
         which = np.asarray(solid.which)
         parts, of_parts = parts_of_one(parts, shape.vertices, which)
-    density = entry.made_of.density if solid.sounding is None else solid.sounding.model.density
     return Body(
         entry,
         rigid.mass,
@@ -240,23 +223,28 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         which,
         parts,
         tuple(of_parts),
-        rigid.mass / density if solid.volume is None else solid.volume,
-        solid.sounding,
-        solid.listening,
+        cylinder_of(parts[0]) if len(parts) == 1 else None,
+        solid.volume,
+        solid.find,
         solid.radius,
         turn,
-        solid.accuracy,
     )
 
 
-def upright(mesh: str) -> Array | None:
+def upright(mesh: str, up: str = "auto") -> Array | None:
     """Rotation (3, 3) from the coordinates of a mesh file to axes whose z points up, None if none.
+
+    The axis `up` of the file points up: x, y or z, or "auto", which is y of glTF and z of others.
 
     Examples
     --------
     >>> upright("bar.GLB") @ [0.0, 1.0, 0.0]
     array([0., 0., 1.])
-    >>> upright("bar.obj") is None
-    True
+    >>> upright("bar.obj") is None, upright("bar.glb", "z") is None
+    (True, True)
+    >>> upright("bar.obj", "x") @ [1.0, 0.0, 0.0]
+    array([0., 0., 1.])
     """
-    return _Y_TO_Z if Path(mesh).suffix.lower() in Y_UP else None
+    if up == "auto":
+        up = "y" if Path(mesh).suffix.lower() in Y_UP else "z"
+    return _TO_Z[up]

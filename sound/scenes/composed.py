@@ -25,14 +25,14 @@ from carillon.fem.regions import Damping as Coefficients
 from carillon.fem.regions import Regions
 from solver.analysis.solid_surface import SolidSurface
 from sound.scenes.scene import ObjectEntry
-from sound.scenes.solved import Discretised, SolvedSolid, discretised, kept, with_modes
+from sound.scenes.solved import Discretised, SolvedSolid, UnsolvedSolid, kept
 from sound.scenes.touched import touched_material
 
 INWARDS = 1e-5
 """Step from the surface at which it is asked what it is of, over the longest side."""
 REST = "the rest"
 """Name of the region of an object's own material."""
-_VERSION = 1  # counted up when other modes are found than before
+_VERSION = 2  # counted up when other modes are found than before
 
 
 class ComposedObject:
@@ -68,22 +68,29 @@ class ComposedObject:
             zip([*([] if rest is None else rest.names), *rows], map(_coefficients, self.materials))
         )
 
-    def solid(self, how: Discretised) -> SolvedSolid:
-        """The solid, and its modes.
+    def unsolved(self, how: Discretised) -> UnsolvedSolid:
+        """The solid, without modes yet."""
+        return UnsolvedSolid(self._inside, self._entry.name, how, self._made, self._placed_on)
+
+    def solved(self, unsolved: UnsolvedSolid) -> SolvedSolid:
+        """The solid with its modes.
 
         Raises UserError if it cannot be made, and ConvergenceError if modes were not found.
         """
-        name = self._entry.name
-        solid = discretised(self._inside, name, how, self._made)
-        if how.count == 0:
-            return solid
-        key = hashlib.sha256(repr((__version__, _VERSION, how)).encode())
-        for part in _content(solid.model):
+        model = unsolved.model
+        key = hashlib.sha256(repr((__version__, _VERSION, unsolved.how)).encode())
+        for part in _content(model):
             key.update(np.ascontiguousarray(part).tobytes())
-        found = kept(
-            key.hexdigest(), lambda: with_modes(self._inside, name, how, self._made, solid)
-        )
-        return replace(found, model=solid.model)  # files do not name the region if there is one
+        found = kept(key.hexdigest(), unsolved.solved)
+        if model.region is None:  # files do not name the region if there is one
+            return replace(found, model=found.model.with_regions(model.regions))
+        return replace(found, model=losing(found.model, self._coefficients))
+
+    def _placed_on(self, cells: FiniteCells) -> PlacedRegions:
+        placed = self.composition.of_cells(cells, complete=False)
+        names = placed.regions.names
+        damping = tuple(self._coefficients[name] for name in names)
+        return replace(placed, regions=replace(placed.regions, damping=damping))
 
     def _made(self, mesh: HexMesh | FiniteCells) -> Solid:
         model: Solid

@@ -1,6 +1,8 @@
 """The solid of a scene's object: of a design, a modes file, a mesh or a ball."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,23 +25,35 @@ from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.composed import ComposedObject, losing
 from sound.scenes.scene import ObjectEntry
-from sound.scenes.solved import Discretised
+from sound.scenes.solved import Discretised, SolvedSolid, scaled_rigid
 from sound.scenes.touched import touched_in_file, young_near
-from sound.scenes.uniform import UniformSolid, uniform_solid
+from sound.scenes.uniform import DENSITY, UniformSolid, scaled
 
 BALL_DIVISIONS = 3
 """Number of times that the faces of an icosahedron are divided to make the surface of a ball."""
 
 
 @dataclass(frozen=True)
-class ObjectSolid:
-    """The solid of an object, in the coordinates of its file.
+class Sounding:
+    """How an object sounds.
 
     Attributes
     ----------
-    sounding, listening
-        Modes, None if the object is silent; loudness and noise of a design's clips, None without.
+    solid, listening
+        Modes; loudness and noise of a design's clips, None without.
+    accuracy
+        Expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`; None if they are
+        unknown.
     """
+
+    solid: SoundingSolid
+    listening: Listening | None = None
+    accuracy: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class ObjectSolid:
+    """The solid of an object, in the coordinates of its file."""
 
     rigid: MassProperties
     """Mass, centre of mass and inertia."""
@@ -53,25 +67,25 @@ class ObjectSolid:
     which: Integers | None
     """What it is made of as others touch it, and number (V,) of that at each vertex; None if there
     is one."""
-    sounding: SoundingSolid | None
+    volume: float
+    """float [m^3]: volume of the material."""
+    find: Callable[[], Sounding] | None
+    """Finds the modes, which may take long; None if the object is silent. Raises ConvergenceError
+    if they were not found."""
     mesh: str = ""
     """str: name of the mesh file that the solid was made from, empty if there is none."""
-    listening: Listening | None = None
     radius: float | None = None
     """float [m] or None: radius of a ball, None for any other solid."""
-    accuracy: dict[str, Any] | None = None
-    """dict or None: expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`."""
-    volume: float | None = None
-    """float [m^3] or None: volume of the material; None if the object's density tells it."""
     is_held: bool = False
     """bool: whether something holds it in its place."""
 
 
 def object_solid(entry: ObjectEntry) -> ObjectSolid:
-    """The solid that an entry of a scene describes.
+    """The solid that an entry of a scene describes, whose modes are found later.
 
-    Raises UserError if a file is missing or unusable, or a solid cannot be made, and
-    ConvergenceError if the modes were not found.
+    Those of an object with a pitch are found at once, since they tell its size.  Raises UserError
+    if a file is missing or unusable, or a solid cannot be made, and ConvergenceError if such modes
+    were not found.
     """
     if entry.design is not None:
         return _of_design(entry, entry.design)
@@ -79,10 +93,21 @@ def object_solid(entry: ObjectEntry) -> ObjectSolid:
         return _of_modes(entry, entry.modes, entry.heard_modes)
     if entry.radius is not None:
         return _of_ball(entry, entry.radius)
-    assert entry.mesh is not None
+    mesh = entry.mesh
+    assert mesh is not None
+    if entry.size is not None:
+        entry = _in_metres(entry, mesh, entry.size)
     if entry.regions or entry.supports:
-        return _of_parts(entry, entry.mesh)
-    return _of_mesh(entry, entry.mesh)
+        return _of_parts(entry, mesh)
+    return _of_mesh(entry, mesh)
+
+
+def _in_metres(entry: ObjectEntry, mesh: str, size: float) -> ObjectEntry:
+    """The entry with the unit at which the longest side of its mesh is a size [m]."""
+    longest = max(SolidSurface.read(mesh).extents)
+    if not longest > 0.0:
+        raise UserError(f"{mesh}: has no size, so it cannot be scaled; name another mesh")
+    return replace(entry, unit=size / longest, size=None)
 
 
 def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
@@ -98,10 +123,9 @@ def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
         touched.poisson,
         touched.materials,
         touched.which,
-        sounding,
+        _volume(design.model),
+        lambda: Sounding(sounding, Listening.of_design(design, sounding)),
         design.settings.get("mesh", ""),
-        Listening.of_design(design, sounding),
-        volume=_volume(design.model),
         is_held=design.model.rigid_modes < RIGID_MODES,
     )
 
@@ -119,6 +143,7 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
         kept = ("discretisation", "resolution")
         accuracy |= {key: attributes[key] for key in kept if key in attributes}
     touched = touched_in_file(entry, path, file.model, vertices)
+    sounding = _heard(entry, heard)
     return ObjectSolid(
         mass_properties(file.model),
         vertices,
@@ -127,10 +152,9 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
         touched.poisson,
         touched.materials,
         touched.which,
-        _heard(entry, heard),
+        _volume(file.model),
+        lambda: Sounding(sounding, accuracy=accuracy or None),
         file.attributes.get("mesh", ""),
-        accuracy=accuracy or None,
-        volume=_volume(file.model),
         is_held=file.model.rigid_modes < RIGID_MODES,
     )
 
@@ -149,8 +173,8 @@ def _heard(entry: ObjectEntry, file: ModesFile) -> SoundingSolid:
     return SoundingSolid.damped(losing(file.model, by_name), file.eigenvalues, file.modes)
 
 
-def _volume(model: Solid) -> float | None:
-    return None if model.region is None and model.supports is None else model.mass / model.density
+def _volume(model: Solid) -> float:
+    return float(model.mass / model.density)
 
 
 def _of_kind(path: str, expected: str) -> str:
@@ -176,26 +200,26 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     import trimesh
 
     sphere = trimesh.creation.icosphere(BALL_DIVISIONS, 1.0)
-    sounding, accuracy = None, None
+    find = None
     if entry.count:
-        ball, factor = _uniform(sphere, entry, radius)
-        radius *= factor
-        sounding, accuracy = ball.sounding(_damping(entry)), ball.accuracy
+        ball = _Scaled(sphere.copy(), entry, radius)
+        radius *= ball.factor
+        find = ball.sounding
     sphere.apply_scale(radius)
-    mass = 4.0 / 3.0 * np.pi * radius**3 * entry.made_of.density
+    volume = 4.0 / 3.0 * np.pi * radius**3
+    mass = volume * entry.made_of.density
     moments = np.full(3, 0.4 * mass * radius**2)
-    rigid = MassProperties(mass, np.zeros(3), moments, np.eye(3))
     return ObjectSolid(
-        rigid,
+        MassProperties(mass, np.zeros(3), moments, np.eye(3)),
         np.asarray(sphere.vertices),
         np.asarray(sphere.faces),
         np.full(len(sphere.vertices), entry.made_of.young),
         entry.made_of.poisson,
         (entry.made_of,),
         None,
-        sounding,
+        volume,
+        find,
         radius=radius,
-        accuracy=accuracy,
     )
 
 
@@ -210,20 +234,21 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     size = entry.unit / unit
     if wall is not None:
         wall = WallSize(wall.thickness / size, wall.side)
-    solid, factor = _uniform(SolidSurface.read(mesh, unit, wall).solid, entry, size)
+    solid = _Scaled(SolidSurface.read(mesh, unit, wall).solid, entry, size)
+    rigid = solid.rigid
     doubt_unit(mesh, surface.extents, entry.unit)
-    surface.apply_scale(factor)
+    surface.apply_scale(solid.factor)
     return ObjectSolid(
-        mass_properties(solid.model),
+        rigid,
         np.asarray(surface.vertices),
         np.asarray(surface.faces),
         np.full(len(surface.vertices), entry.made_of.young),
         entry.made_of.poisson,
         (entry.made_of,),
         None,
-        solid.sounding(_damping(entry)),
+        rigid.mass / entry.made_of.density,
+        solid.sounding if entry.count else None,
         mesh,
-        accuracy=solid.accuracy if entry.count else None,
     )
 
 
@@ -236,41 +261,66 @@ def _of_parts(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     surface = struck_surface(mesh, entry.unit, composed.parts_of, entry.wall_size)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
     which = composed.parts_of(vertices, faces)
-    solid = composed.solid(_how(entry))
+    unsolved = composed.unsolved(_how(entry))
+    rigid, model = unsolved.rigid, unsolved.model
     doubt_unit(mesh, surface.extents, entry.unit)
-    factor = 1.0
+    find, factor = partial(_found, partial(composed.solved, unsolved)), 1.0
     if entry.pitch is not None:
-        factor = solid.factor_to(entry.pitch)
-        solid = solid.resized(factor)
+        solved = composed.solved(unsolved)
+        factor = solved.factor_to(entry.pitch)
+        rigid = scaled_rigid(rigid, factor)
+        find = partial(_found, partial(solved.resized, factor))
     of_parts = composed.materials
     young, poisson = np.array([(each.young, each.poisson) for each in of_parts])[which].T
     return ObjectSolid(
-        mass_properties(solid.model),
+        rigid,
         factor * vertices,
         faces,
         young,
         poisson,
         of_parts,
         which,
-        solid.sounding(),
+        factor**3 * _volume(model),
+        find if entry.count else None,
         mesh,
-        accuracy=solid.accuracy if entry.count else None,
-        volume=_volume(solid.model),
-        is_held=solid.model.rigid_modes < RIGID_MODES,
+        is_held=model.rigid_modes < RIGID_MODES,
     )
 
 
+def _found(solved: Callable[[], SolvedSolid]) -> Sounding:
+    solid = solved()
+    return Sounding(solid.sounding(), accuracy=solid.accuracy)
+
+
 def _how(entry: ObjectEntry) -> Discretised:
-    return Discretised(entry.discretisation, entry.resolution, entry.components, entry.count)
+    return Discretised(
+        entry.discretisation, entry.resolution, entry.components, entry.count, entry.accuracy
+    )
 
 
-def _uniform(
-    surface: Surface | Wall, entry: ObjectEntry, size: float
-) -> tuple[UniformSolid, float]:
-    """The solid of a surface of size 1, at a size; and the factor of the entry's pitch."""
-    material = entry.made_of
-    solid = uniform_solid(surface, entry.name, _how(entry), material.poisson)
-    return solid.sized(size, material.young, material.density, entry.pitch)
+class _Scaled:
+    """The uniform solid of a surface, enlarged by a size, and by a factor that gives it a pitch."""
+
+    def __init__(self, surface: Surface | Wall, entry: ObjectEntry, size: float) -> None:
+        self._material, self._damping = entry.made_of, _damping(entry)
+        self._solid = UniformSolid(surface, entry.name, _how(entry), self._material.poisson)
+        self.factor = 1.0
+        if entry.pitch is not None:
+            self.factor = self._solved(size).factor_to(entry.pitch)
+        self._size = self.factor * size
+
+    @property
+    def rigid(self) -> MassProperties:
+        """Mass, centre of mass and inertia."""
+        return scaled_rigid(self._solid.rigid, self._size, self._material.density / DENSITY)
+
+    def sounding(self) -> Sounding:
+        """The modes; raises ConvergenceError if they were not found."""
+        solid = self._solved(self._size)
+        return Sounding(solid.sounding(self._damping), accuracy=solid.accuracy)
+
+    def _solved(self, size: float) -> SolvedSolid:
+        return scaled(self._solid.solved, size, self._material.young, self._material.density)
 
 
 def _damping(entry: ObjectEntry) -> Damping:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
+from sound.scenes.scene import GROUND_NAME
 
 GROUND = -1
 """Number that stands for the ground in pairs of bodies."""
@@ -199,7 +200,7 @@ def write_impacts(path: str | Path, performance: Performance) -> None:
         table = csv.writer(file)
         table.writerow(COLUMNS)
         for impact in performance.impacts:
-            pair = ["ground" if each == GROUND else names[each] for each in impact.pair]
+            pair = [GROUND_NAME if each == GROUND else names[each] for each in impact.pair]
             strength = float(np.linalg.norm(impact.impulse))
             numbers = [strength, impact.speed, impact.duration]
             table.writerow(

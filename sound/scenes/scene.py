@@ -11,6 +11,7 @@ from carillon.composition.entries import RegionEntry, SupportEntry
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.errors import UserError
 from carillon.fem.geometry.walls import WallSize
+from carillon.limits import EXTENTS
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.documents import parameters_from, read_parameters
 from carillon.parameters.fields import parameters_of
@@ -35,10 +36,15 @@ FILES = ("design", "modes", "mesh", "heard_modes")
 """Keys of an object that name files."""
 REGION_FILES = ("mesh", "labels")
 """Keys of a region that name files."""
+GROUND_NAME = "ground"
+"""What lists and scenes call the floor."""
 STANDARD_MATERIAL = "plastic"
 """Name of the material of designs and modes files, for what these do not tell."""
 _SUITS = {
     "unit": ("mesh",),
+    "size": ("mesh",),
+    "up": ("mesh", "modes", "design"),
+    "accuracy": ("mesh", "radius"),
     "pitch": ("mesh", "radius"),
     "density": ("mesh", "radius"),
     "heard_modes": ("modes",),
@@ -91,8 +97,7 @@ class ObjectEntry:
     )
     mesh: File | None = option(
         None,
-        "either builtin:NAME or a mesh file, relative to the scene; the y of glTF "
-        "points up and becomes z, of all other files z points up",
+        "either builtin:NAME or a mesh file, relative to the scene; `up` says which axis points up",
     )
     radius: Annotated[float, between(1e-4, 100.0)] | None = option(
         None, "radius of a ball of one material [m]"
@@ -115,6 +120,14 @@ class ObjectEntry:
         "modes and designs are in their files",
     )
     unit: MetresPerUnit = option(1.0)
+    size: Annotated[float, between(*EXTENTS)] | None = option(
+        None, "longest side of a mesh [m], to which it is scaled, in place of a unit"
+    )
+    up: Annotated[str, OneOf("auto", "x", "y", "z")] = option(
+        "auto",
+        "axis of the mesh file that points up, which is turned to the z of the scene, also of a "
+        "design or of modes that were made of one; auto is y of glTF and z of all others",
+    )
     pitch: Annotated[float, between(20.0, 20_000.0)] | None = option(
         None, "frequency of its first mode, to which a mesh is scaled [Hz]; null leaves its size"
     )
@@ -122,6 +135,11 @@ class ObjectEntry:
         28,
         "lattice spacings, or voxels, along the longest side of a mesh or ball whose modes are "
         "computed [1]; the summary tells how far frequencies are expected to be from the solid's",
+    )
+    accuracy: Annotated[float, between(1e-4, 1.0)] | None = option(
+        0.01,
+        "expected relative error of the frequencies down to which finite cells are divided: the "
+        "root mean square, and a third of the worst; null divides none",
     )
     discretisation: Annotated[str, OneOf("auto", "finite-cell", "voxel")] = option(
         "auto",
@@ -139,6 +157,11 @@ class ObjectEntry:
     )
     density: Density | None = option(None, "mass density in place of the material's own [kg/m^3]")
     position: Vector = option((0.0, 0.0, 0.0), "where its centre of mass is at the start [m]")
+    stands_on: ShownName | None = option(
+        None,
+        "ground, or the name of another object: the height of its position is the least at which "
+        "it lies on that, so z stays 0",
+    )
     rotation: Triple[Annotated[float, between(-3600.0, 3600.0)]] = option(
         (0.0, 0.0, 0.0),
         "turns about the axes x, y, z of the scene, one after the other [degrees]",
@@ -198,6 +221,15 @@ class ObjectEntry:
             raise ValueError(
                 "a wall is of finite cells; take discretisation auto or finite-cell, or leave out "
                 "the wall"
+            )
+        if self.size is not None and self.unit != 1.0:
+            raise ValueError("size tells how large the mesh is; leave out the unit")
+        if self.size is not None and self.pitch is not None:
+            raise ValueError("pitch tells how large the mesh is; leave out the size")
+        if self.stands_on is not None and self.position[2] != 0.0:
+            raise ValueError(
+                f"stands_on tells the height; found a position whose z is {self.position[2]:g}, "
+                "expected 0"
             )
         if self.pitch is not None and self.count == 0:
             raise ValueError("pitch goes with a count of modes above 0; what is silent has none")
@@ -360,6 +392,28 @@ class Scene:
                     ("objects", number, "name"),
                     f"several objects are named {name!r}; give each a name of its own",
                 )
+        self._require_support()
+
+    def _require_support(self) -> None:
+        """Refuse objects that stand on what is not there, or on each other in a circle."""
+        below = {each.name: each.stands_on for each in self.objects}
+        for number, (name, support) in enumerate(below.items()):
+            path = ("objects", number, "stands_on")
+            if support == GROUND_NAME and self.ground is None:
+                raise ParameterError(path, "there is no ground; give the ground a height")
+            if support not in (None, GROUND_NAME, *below):
+                raise ParameterError(
+                    path,
+                    f"found {support!r}, expected {GROUND_NAME} or the name of another object",
+                )
+            chain = [name]
+            while support in below:
+                if support in chain:
+                    raise ParameterError(
+                        path, f"{' on '.join([*chain, support])}: nothing carries them"
+                    )
+                chain.append(support)
+                support = below[support]
 
     @property
     def files(self) -> list[str]:

@@ -26,6 +26,8 @@ EXAMPLES = """examples:
   carillon scene builtin:bars --notes "C6 E6 G6 C7" --out tune.wav --page tune.html
 """
 BARS = "builtin:bars"
+NAMED = 3
+"""Greatest number of objects that a line names."""
 OUTPUTS = {
     "out": (".wav",),
     "video": (".mp4", ".webm"),
@@ -71,7 +73,10 @@ def run(arguments: argparse.Namespace) -> int:
     performance = perform(scene)
     _write(options, performance)
     summary = _summary(options, performance)
-    print(json.dumps(summary) if options.json else _sentence(summary))
+    if options.json:
+        print(json.dumps(summary))
+    else:
+        print(_sentence(summary), *_pitches(performance), sep="\n")
     return 0
 
 
@@ -144,6 +149,11 @@ def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
             (float((each.impulse**2).sum() ** 0.5) for each in impacts), default=None
         ),
         "accuracy": _accuracies(performance),
+        "lowest_hz": {
+            each.name: float(voice.frequencies.min())
+            for each, voice in zip(performance.picture.objects, performance.voices)
+            if voice is not None and len(voice.frequencies)
+        },
         "moved_metres": performance.moved,
         "timings": performance.timings,
         "full_scale_pascal": 1.0 / performance.scale,
@@ -153,21 +163,35 @@ def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
 
 def _accuracies(performance: Performance) -> dict[str, dict[str, Any] | None]:
     """How far frequencies of each object that sounds are expected to be off; None if unknown."""
+    from sound.scenes.expected_cents import in_cents
+
     accuracies = performance.accuracies or [None] * len(performance.voices)
     names = [each.name for each in performance.picture.objects]
     known = zip(names, accuracies, performance.voices)
-    return {name: accuracy for name, accuracy, voice in known if voice is not None}
+    return {
+        name: None if accuracy is None else {**accuracy, **in_cents(accuracy)}
+        for name, accuracy, voice in known
+        if voice is not None
+    }
 
 
-def _expected(accuracies: dict[str, dict[str, Any] | None]) -> str:
-    from solver.refinement.errors import FROM_SOLID, in_words
+def _pitches(performance: Performance) -> list[str]:
+    """A line for each object that sounds; those that sound alike share one."""
+    from sound.scenes.expected_cents import told
 
-    worst = f"{FROM_SOLID}_worst"
-    known = {name: each for name, each in accuracies.items() if each and worst in each}
-    if not known:
-        return ""
-    name = max(known, key=lambda name: abs(known[name][worst]))
-    return f"\nexpected distance from the solid, of {name!r} {in_words(known[name], FROM_SOLID)}"
+    accuracies = performance.accuracies or [None] * len(performance.voices)
+    names: dict[str, list[str]] = {}
+    for each, accuracy, voice in zip(performance.picture.objects, accuracies, performance.voices):
+        if voice is not None and len(voice.frequencies):
+            lowest = float(voice.frequencies.min())
+            line = f"{len(voice.frequencies)} modes from {lowest:,.1f} Hz, {told(accuracy)}"
+            names.setdefault(line, []).append(each.name)
+    return [f"{_listed(alike)}: {line}" for line, alike in names.items()]
+
+
+def _listed(names: list[str]) -> str:
+    rest = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{', '.join(names[:NAMED])}{rest}"
 
 
 def _sentence(summary: dict[str, Any]) -> str:
@@ -175,5 +199,5 @@ def _sentence(summary: dict[str, Any]) -> str:
     return (
         f"{', '.join(files)}: {summary['seconds']:.4g} s, {summary['objects']} objects with "
         f"{summary['modes']} modes, {summary['impacts']:,} impacts; full scale is "
-        f"{summary['full_scale_pascal']:.3g} Pa{_expected(summary['accuracy'])}"
+        f"{summary['full_scale_pascal']:.3g} Pa"
     )

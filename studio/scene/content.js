@@ -9,7 +9,7 @@ import { gainsOf, positionsOf } from "../standalone/design.js";
  * @property {(vertex: number, mode: number) => number} gainOf What a mode sounds with after 1 N s.
  * @property {number} impulse [N s] Of a strike by hand.
  * @property {number} contactSeconds
- * @property {number | null} expectedError Relative, of the frequencies (rms); null if nothing is known.
+ * @property {number | null} expectedCents Expected error of the frequencies (rms); null if nothing is known.
  *
  * @typedef {object} Body An object of the scene.
  * @property {number} number
@@ -90,7 +90,7 @@ function readBody(told, number, arrays) {
           gainOf: gainsOf(own("halves"), own("loudest")),
           impulse: told.impulse_ns,
           contactSeconds: told.contact_s,
-          expectedError: told.expected_error,
+          expectedCents: told.expected_cents,
         }
       : null,
   };

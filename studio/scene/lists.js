@@ -45,7 +45,7 @@ function soundOf({ voice }) {
   const lowest = shown.frequency(Math.min(...voice.hertz));
   const { length } = voice.hertz;
   const says = length === 1 ? `1 mode, ${lowest}` : `${length} modes from ${lowest}`;
-  return voice.expectedError === null ? says : `${says}, about ${shown.share(voice.expectedError)} off`;
+  return voice.expectedCents === null ? says : `${says}, about ${shown.cents(voice.expectedCents)} off`;
 }
 
 /**

@@ -39,7 +39,7 @@ export const frequency = (hertz) =>
   hertz < 1000 ? `${hertz.toFixed(0)} Hz` : `${(hertz / 1000).toFixed(2)} kHz`;
 
 /** @param {number} value @returns {string} */
-export const share = (value) => `${short(100 * value)} %`;
+export const cents = (value) => `${short(value)} cents`;
 
 /** @param {number} seconds @returns {string} */
 export const time = (seconds) => seconds.toFixed(2);

@@ -10,7 +10,7 @@ from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
-from solver.refinement.errors import FROM_SOLID
+from sound.scenes.expected_cents import in_cents
 from sound.scenes.performance import GROUND, Appearance, Impact, Performance, Voice
 from studio.binary import pack
 from studio.standalone.content import halved, index_type, stepped
@@ -93,7 +93,7 @@ def content(performance: Performance) -> bytes:
         own, entry = _surface(appearance)
         if voice is not None and len(voice.frequencies) > 0:
             own |= _modes(voice)
-            entry["expected_error"] = (accuracies[number] or {}).get(f"{FROM_SOLID}_rms")
+            entry["expected_cents"] = in_cents(accuracies[number]).get("expected_cents_rms")
             entry |= _strike(voice, [e for e in performance.impacts if number in e.pair])
         header["objects"].append(entry)
         arrays |= {f"{name}_{number}": values for name, values in own.items()}

@@ -22,7 +22,7 @@ import numba
 import numpy as np
 
 from carillon.arrays import Array, Complex
-from sound.scenes.bodies import Shape
+from sound.scenes.shape import Shape
 
 AIR_DENSITY = 1.204
 """Density [kg/m^3] of air at 20 C."""

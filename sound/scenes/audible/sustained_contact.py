@@ -2,7 +2,10 @@
 
 The profile of a surface along the way of a rolling or sliding contact is a sum of octaves of smooth
 random waves, whose heights fall with the wavelength as those of a self-affine surface (B. Persson,
-Surface Science Reports 61, 2006).  Waves shorter than the patch of contact are left out.
+Surface Science Reports 61, 2006).  The patch of contact averages waves shorter than itself: of the
+wavenumber q and the patch's radius a there is left (1 + pi/4 (q a)^3)^(-1/2) (P. J. Remington,
+Wheel/rail rolling noise, Journal of the Acoustical Society of America 81, 1987).  What force this
+makes tells `sound.scenes.audible.rough_contact`.
 """
 
 from dataclasses import dataclass
@@ -14,9 +17,10 @@ from scipy.signal import butter, lfilter
 
 from carillon.arrays import Array, Index
 from sound.scenes.audible.contact_damping import dashpot
+from sound.scenes.audible.rough_contact import relative_force, trace
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.contact.impacts import SustainedContact
-from sound.scenes.hertz import patch_radius, stiffness
+from sound.scenes.hertz import patch_radius
 from sound.synthesis.driven import BLOCK
 
 LOWEST_HERTZ = 20.0
@@ -67,8 +71,8 @@ def sustained_force(
 ) -> SustainedForce | None:
     """The sustained force of a pair of bodies; None if there is none.
 
-    A bump of the height h presses the bodies together by another h, which changes their force by h
-    times the stiffness of the contact, at most by all of it.  Heights are those of the roughest
+    Its fluctuation is that of a contact over rough surfaces, see
+    `sound.scenes.audible.rough_contact`.  Heights are those of the roughest
     point in each block, at random by the seed.  The scene lasts so many seconds, and a step of the
     simulation `step_seconds`; the rate is in Hz.
     """
@@ -89,31 +93,50 @@ def sustained_force(
     )
     pace = np.linalg.norm(sliding, axis=1) + radius * contacts.turning
     speeds = np.add.reduceat(pace, firsts) / points
-    springs = stiffness(forces, radius, modulus)
     words = np.random.SeedSequence([seed, *(each + 1 for each in contact.pair)])
     rough = contact.spots.roughness[chosen]
     roughest = float(rough.max())
     # Distances at the end of each block, less those from each of its samples on.
     ahead = (np.arange(BLOCK) + 1.0) / BLOCK - 1.0
     way = (np.cumsum(speeds) * BLOCK / rate)[:, None] + (speeds * BLOCK / rate)[:, None] * ahead
+    patches = patch_radius(forces, radius, modulus)
     heights = profile(
         way.ravel(),
         np.repeat(speeds, BLOCK),
-        np.repeat(2.0 * patch_radius(forces, radius, modulus), BLOCK),
+        np.repeat(patches, BLOCK),
         roughest,
         int(words.generate_state(1, np.uint64)[0]),
         rate,
     )
     if roughest > 0.0:
+        heights = trace(way.ravel(), heights, radius)
         heights *= np.repeat(np.maximum.reduceat(rough, firsts) / roughest, BLOCK)
-    fluctuation = np.clip(heights * np.repeat(springs / forces, BLOCK), -1.0, 1.0)
+    mass = float(np.median(contacts.masses))
+    dashpots = dashpot(forces, radius, modulus, mass)
+    pressed, damped = np.repeat(forces, BLOCK), np.repeat(dashpots, BLOCK)
+    within = np.repeat(height_within(patches, roughest), BLOCK)
+    fluctuation = relative_force(heights, within, pressed, radius, modulus, damped, mass, rate)
     b, a = butter(1, LOWEST_HERTZ, "highpass", fs=rate)
-    courses = lfilter(b, a, fluctuation - fluctuation[0]).reshape(-1, BLOCK)
-    dashpots = dashpot(forces, radius, modulus, float(np.median(contacts.masses)))
+    courses = lfilter(b, a, fluctuation).reshape(-1, BLOCK)
     vertices = contact.spots.vertices[chosen]
     return SustainedForce(
         contact.pair, contacts, vertices, shares, blocks, firsts, steps, courses, dashpots
     )
+
+
+def height_within(patches: Array, rms: float) -> Array:
+    """Root mean square height [m] of a roughness [m] at waves shorter than the patches of contact.
+
+    `patches` are radii [m].
+
+    Examples
+    --------
+    >>> bool(height_within(np.array(LONGEST_WAVE), 1e-6) == 1e-6)
+    True
+    >>> f"{height_within(np.array(1e-4), 1e-6):.2g}"
+    '7.6e-08'
+    """
+    return np.asarray(rms * np.minimum(2.0 * patches / LONGEST_WAVE, 1.0) ** HURST)
 
 
 def octave_heights(rms: float) -> Array:
@@ -127,7 +150,7 @@ def profile(way: Array, speeds: Array, patches: Array, rms: float, seed: int, ra
     way (s,) [m].
 
     Waves are left out that are passed faster than half the sampling rate [Hz], by the speeds (s,)
-    [m/s], and those shorter than the patch of contact, by its diameters (s,) [m].
+    [m/s]; those shorter than the patch of contact, of the radii (s,) [m], are averaged by it.
     """
     heights = octave_heights(rms) / _LATTICE_RMS
     return np.asarray(_profile(way, speeds, patches, heights, np.uint64(seed), float(rate)))
@@ -139,8 +162,9 @@ def _profile(way, speeds, patches, heights, seed, rate):  # type: ignore[no-unty
     for n in range(len(way)):
         wave = LONGEST_WAVE
         for octave in range(len(heights)):
-            if wave < 2.0 * patches[n] or 2.0 * speeds[n] > wave * rate:
+            if 2.0 * speeds[n] > wave * rate:
                 break
+            left = 1.0 / np.sqrt(1.0 + 0.25 * np.pi * (2.0 * np.pi * patches[n] / wave) ** 3)
             place = 2.0 * way[n] / wave
             cell = np.floor(place)
             share = place - cell
@@ -148,7 +172,7 @@ def _profile(way, speeds, patches, heights, seed, rate):  # type: ignore[no-unty
             number = np.int64(cell)
             low = _hashed(number, octave, seed)
             high = _hashed(number + 1, octave, seed)
-            felt[n] += heights[octave] * (low + smooth * (high - low))
+            felt[n] += left * heights[octave] * (low + smooth * (high - low))
             wave *= 0.5
     return felt
 

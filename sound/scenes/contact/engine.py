@@ -17,7 +17,9 @@ from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError, one_line
 from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactLog, ContactPoints
+from sound.scenes.contact.standing import stood
 from sound.scenes.contact.start import start
+from sound.scenes.cylinder import Cylinder
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import Motion
 from sound.scenes.scene import EngineEntry, Vector
@@ -75,7 +77,8 @@ def simulate(
 ) -> Course:
     """Simulate the motion of bodies for some seconds under gravity (3,) [m/s^2].
 
-    Bodies that overlap a little at the start are separated, see `sound.scenes.contact.start`.
+    Those that stand on something are put there, see `sound.scenes.contact.standing`, and those that
+    overlap a little at the start are separated, see `sound.scenes.contact.start`.
     Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the masses,
     and leaves the share of speed that the restitution says.  Bodies that lie still sleep.  Raises
     UserError if two bodies overlap much at the start, the simulation is unstable, or there are too
@@ -83,6 +86,9 @@ def simulate(
     """
     mujoco = loaded()
     model = _model(mujoco, bodies, engine, gravity, ground)
+    if any(body.entry.stands_on for body in bodies):
+        bodies = stood(model, bodies, ground.height)
+        model = _model(mujoco, bodies, engine, gravity, ground)
     data = mujoco.MjData(model)
     moved = start(data, bodies, gravity, engine.contact_seconds)
     recorder = _Recorder(model, data, bodies)
@@ -162,10 +168,25 @@ def _add_body(mujoco: ModuleType, spec: Any, engine: EngineEntry, number: int, b
     if body.radius is not None:
         size = [body.radius, 0.0, 0.0]
         added.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, **contacts[0])
+    if body.cylinder is not None:
+        _add_cylinder(mujoco, added, body.cylinder, contacts[body.of_parts[0]])
+        return
     for part, (corners, material) in enumerate(zip(body.parts, body.of_parts)):
         name = f"{number} {part}"
         spec.add_mesh(name=name, uservert=corners.ravel().tolist())
         added.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **contacts[material])
+
+
+def _add_cylinder(
+    mujoco: ModuleType, added: Any, cylinder: Cylinder, contact: dict[str, Any]
+) -> None:
+    added.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        pos=cylinder.centre.tolist(),
+        zaxis=cylinder.axis.tolist(),
+        size=[cylinder.radius, cylinder.half_length, 0.0],
+        **contact,
+    )
 
 
 def _contact_options(engine: EngineEntry, friction: float, restitution: float) -> dict[str, Any]:

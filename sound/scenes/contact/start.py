@@ -140,7 +140,9 @@ def _require_shallow(
     # Rounded away from the other body, so that the rounded position is clear, too.
     rounded = [_rounded(x, way) for x, way in zip(place, place - begin)]
     if second == GROUND:
-        raise UserError(f"{start}; it rests on it at a height (z) of {rounded[2]} m")
+        raise UserError(
+            f"{start}; it rests on it with stands_on: ground, or at a height (z) of {rounded[2]} m"
+        )
     raise UserError(
         f"{start}; {_name(free, bodies)} would be clear at the position [{', '.join(rounded)}]"
     )

@@ -11,7 +11,7 @@ from carillon.errors import UserError
 from carillon.processes.threads import allowed_threads, blas_threads
 from sound.scenes.audible.hearing import Head
 from sound.scenes.audible.loudness import voice
-from sound.scenes.bodies import Body, bodies_of
+from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.contact.engine import GroundPlane, simulate
 from sound.scenes.contact.impacts import Touch, split_impacts
 from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture
@@ -49,12 +49,15 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     clock.lap("bodies")
     ground = GroundPlane(scene.ground, scene.ground_material)
     course = simulate(bodies, seconds, engine, scene.gravity, ground, visible)
-    clock.lap("motion")
     if not len(course.contacts):
         raise UserError(
             f"nothing touches anything within {seconds:g} s, so nothing sounds; let the "
             "scene last longer, or let objects meet"
         )
+    clock.lap("motion")
+    # After the motion, which tells what is wrong with the scene in a moment.
+    bodies = with_modes(bodies)
+    clock.lap("modes")
     touch = Touch(bodies, ground.material)
     impacts, contacts = split_impacts(course.contacts, touch, engine, scene.gravity)
     clock.lap("contacts")

@@ -79,6 +79,6 @@ def _hertz(name: str) -> float:
 
 def _size(pitch: float) -> tuple[float, float]:
     """Width of a bar of that pitch [Hz], and height of its top above its centre of mass [m]."""
-    described = {"objects": [{**BAR, "name": "bar", "pitch": pitch, "count": 1}]}
+    described = {"objects": [{**BAR, "name": "bar", "pitch": pitch}]}
     shape = body_of(scene_of(described, Path()).objects[0]).shape.vertices
     return float(shape[:, 1].max() - shape[:, 1].min()), float(shape[:, 2].max())

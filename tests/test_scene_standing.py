@@ -1,0 +1,91 @@
+"""Objects of scenes that stand on something, and faults that are told before modes are found."""
+
+import numpy as np
+import pytest
+
+from carillon.errors import UserError
+from tests.scenes import ball, moved, require_engine, scene
+
+BOWL = {"name": "bowl", "mesh": "builtin:bowl", "material": "steel", "count": 0}
+
+
+def at_rest(*objects, **given):
+    """Course of a scene whose objects stay where they are."""
+    require_engine()
+    bodies, course = moved(scene(*objects, **{"seconds": 0.4, **given}))
+    heights = course.motion.positions[:, :, 2]
+    assert np.abs(heights - heights[0]).max() < 2e-5
+    assert course.resting[-1].sum() == sum(not body.entry.fixed for body in bodies)
+    # None is so fast that one would hear it: half of what gravity makes in a bounce.
+    speeds = np.abs(np.diff(heights, axis=0)) / course.motion.times[1]
+    assert speeds.max() < 1e-3 and not course.moved
+    return course
+
+
+def test_a_bowl_stands_on_the_ground_whatever_its_size_and_the_grounds_height():
+    small = at_rest({**BOWL, "stands_on": "ground"}).motion.positions[0, 0, 2]
+    assert small == pytest.approx(0.04278, abs=1e-4)
+    large = at_rest({**BOWL, "stands_on": "ground", "size": 0.5}, ground=-2.0)
+    assert large.motion.positions[0, 0, 2] + 2.0 == pytest.approx(small * 0.5 / 0.16, rel=0.01)
+
+
+def test_balls_stand_on_each_other_in_any_order():
+    course = at_rest(
+        ball("top", stands_on="middle"),
+        ball("middle", stands_on="low"),
+        ball("low", fixed=True, stands_on="ground"),
+        friction_free(),
+    )
+    assert course.motion.positions[0, :3, 2] == pytest.approx([0.05, 0.03, 0.01], abs=1e-6)
+
+
+def friction_free():
+    """A ball aside, so that there is one on the ground, too."""
+    return ball("aside", position=[0.5, 0.0, 0.0], stands_on="ground")
+
+
+def test_a_ball_stands_within_a_bowl():
+    course = at_rest({**BOWL, "stands_on": "ground"}, ball(stands_on="bowl"))
+    bowl, inside = course.motion.positions[0, :, 2]
+    assert inside < bowl + 0.02  # below its rim
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"stands_on": "table"}, "found 'table', expected ground or the name of another object"),
+        ({"stands_on": "ball"}, "ball on ball: nothing carries them"),
+        ({"stands_on": "ground", "position": [0, 0, 1]}, "whose z is 1, expected 0"),
+    ],
+)
+def test_what_stands_on_nothing_is_refused(given, says):
+    with pytest.raises(UserError, match=says):
+        scene(ball(**given))
+
+
+def test_what_does_not_meet_its_support_or_has_no_ground_is_refused():
+    require_engine()
+    aside = ball("aside", position=[1.0, 0.0, 0.0], stands_on="below")
+    with pytest.raises(UserError, match="'aside' at x = 1 m, y = 0 m does not meet object 'below'"):
+        moved(scene(ball("below", stands_on="ground"), aside))
+    with pytest.raises(UserError, match="there is no ground"):
+        scene(ball(stands_on="ground"), ground=None)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"position": [0, 0, 0.01]}, "with stands_on: ground, or at a height"),
+        ({"position": [0, 0, 5.0]}, "nothing touches anything"),
+    ],
+)
+def test_faults_are_told_before_modes_are_found(given, says, monkeypatch):
+    require_engine()
+    import sound.scenes.playing.play as play
+
+    def solved(_):
+        raise AssertionError("modes were found first")
+
+    monkeypatch.setattr(play, "with_modes", solved)
+    with pytest.raises(UserError, match=says):
+        play.perform(scene({**BOWL, "count": 20, **given}, seconds=0.1), 1, visible=False)
