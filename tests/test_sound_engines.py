@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import shutil
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
+from studio.processes.exports import Exports
 from tests.chromium import chromium, served
 from tests.gltf_files import validated
 from tests.programs import run
@@ -148,7 +150,7 @@ def test_a_folder_is_filled_again_beside_what_others_keep_there(folder, tmp_path
     (path / "sounds").mkdir(parents=True)
     (path / "sounds/pan_corner_s1_v1.wav.meta").write_text("of an engine")
     (path / "pan.glb").write_text("of before")
-    assert main(["export", str(folder / "pan.h5"), "--out", str(path), *FEW]) == 0
+    assert main(["export", str(folder / "pan.h5"), "--out", f"{path}/", *FEW]) == 0
     assert (path / "sounds/pan_corner_s1_v1.wav.meta").read_text() == "of an engine"
     assert (path / "pan.glb").read_bytes() == (folder / "pan/pan.glb").read_bytes()
     assert not [each for each in path.iterdir() if each.name.startswith(STAGING)]
@@ -186,6 +188,10 @@ def test_folders_that_cannot_be_are_refused(folder, tmp_path, refuses):
     assert "is no folder" in said
     said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'a/b'}/")
     assert "create it first" in said
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new.glb'}/")
+    assert "ends in .glb, but a folder is asked for" in said
+    said = refuses(main, "export", folder / "pan.h5", "--out", tmp_path)
+    assert "/ for a folder" in said
     many = ["--points", "1000", "--variations", "32"]
     said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new'}/", *many)
     assert "expected at most 2,000" in said and not (tmp_path / "new").exists()
@@ -258,3 +264,13 @@ def test_a_module_names_the_points_that_it_has(folder):
         "there is no point lid, expected a number below 2 or one of corner, side"
         in run("node", *words).stderr
     )
+
+
+def test_the_studio_packs_the_folder(folder, tmp_path):
+    out = tmp_path / "export.zip"
+    Exports().make(str(folder / "pan.h5"), "zip", None, str(out), "my-pan")
+    with zipfile.ZipFile(out) as archive:
+        names = set(archive.namelist())
+        assert 'declare name "my-pan";' in archive.read("my-pan/my-pan.dsp").decode()
+    assert {"my-pan/my-pan.glb", "my-pan/sounds.csv", "my-pan/my-pan.js"} <= names
+    assert sum(name.endswith(".wav") for name in names) == 18

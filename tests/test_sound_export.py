@@ -162,12 +162,12 @@ def test_stiffer_is_lighter():
 
 def test_gltf_has_the_mass_and_the_sounds_of_strikes(folder):
     document, data = read_gltf(folder / "pan.glb")
-    physics = document["nodes"][1]["extensions"][PHYSICS]
+    physics = document["nodes"][0]["extensions"][PHYSICS]
     properties = mass_properties(small_design().model)
     assert physics["motion"]["mass"] == pytest.approx(properties.mass)
-    assert physics["collider"]["geometry"]["node"] == 1
+    assert physics["collider"]["geometry"]["node"] == 0
     sounds = document["extensions"]["KHR_audio_emitter"]
-    for node, strike in zip(document["nodes"][2:], small_design().strikes, strict=True):
+    for node, strike in zip(document["nodes"][1:], small_design().strikes, strict=True):
         (number,) = node["extensions"]["KHR_audio_emitter"]["emitters"]
         emitter = sounds["emitters"][number]
         assert emitter["type"] == "positional" and node["name"] == strike.name
@@ -193,8 +193,8 @@ def test_a_player_of_the_draft_makes_the_designed_sound(folder, name):
     order = np.array(model["extras"]["modeNumbers"]) - 1
     np.testing.assert_allclose(f, small_design().frequencies[order], rtol=1e-6)
     np.testing.assert_allclose(d, small_design().targets.dampings[order], rtol=1e-6)
-    gain = document["nodes"][1]["extensions"][EXTENSION]["gain"]
-    listening = [node["extras"]["gain"] for node in document["nodes"][2:]]
+    gain = document["nodes"][0]["extensions"][EXTENSION]["gain"]
+    listening = [node["extras"]["gain"] for node in document["nodes"][1:]]
     for row, strike in enumerate(small_design().strikes):
         nearest = np.argmin(np.linalg.norm(positions - strike.position, axis=1))
         played = gain * 2 * np.pi * f * (shapes[:, nearest] @ strike.inward)
@@ -276,6 +276,7 @@ def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player):
 
 def test_faust_s_program_names_points_and_units(folder):
     text = (folder / "pan.dsp").read_text()
+    assert 'declare name "design";' in text  # of the design, not of the file
     assert "nPositions = 5;" in text and f"nModes = {N_MODES};" in text
     assert "'corner':0;'side':1;'vertex " in text
     assert "N s" in text and "kg^-1/2" in text

@@ -38,18 +38,16 @@ class ExportSettings:
 
 
 def format_of(out: str, named: str | None = None) -> str:
-    """The format of a file, as named or as its ending says; that of a folder ends in `/`, or it is
-    there.
+    """The format of a file, as named or as its ending says; names of folders end in `/`.
 
     Raises UserError if the two contradict each other, or neither tells one.
     """
     ending = Path(out).suffix.lstrip(".").lower()
-    if named is None and (out.endswith(os.sep) or os.path.isdir(out)):
-        return FOLDER
+    if named is None and out.endswith(os.sep):
+        named = FOLDER
     if named is not None and ending in FORMATS and ending != named:
-        raise UserError(
-            f"--out {out}: ends in .{ending}, but --format is {named}; leave one of them"
-        )
+        asked = f"--format is {named}" if named != FOLDER else "a folder is asked for"
+        raise UserError(f"--out {out}: ends in .{ending}, but {asked}; leave one of them")
     if named is None and ending not in FORMATS:
         raise UserError(
             f"--out {out}: the ending tells no format, expected one of "

@@ -2,8 +2,8 @@
 
 Beside it are the mass properties (draft KHR_physics_rigid_bodies, repository
 eoineoineoin/glTF_Physics, commit ac5c413), with the convex hull as collider, and the sound of a
-strike of 1 N s at each target, see `sound.export.gltf_audio`.  A root node turns the axis that
-points up to glTF's y.
+strike of 1 N s at each target, see `sound.export.gltf_audio`.  The solid's node turns the axis
+that points up to glTF's y.
 
 KHR_audio_rigid_bodies is a draft (Karl Hiner, repository glTF_PhysicalAudio, folder
 extensions/2.0/Khronos/KHR_audio_rigid_bodies; state of 2026, with `modalModels`,
@@ -101,15 +101,15 @@ def gltf_document(
     model, gain = _modal_model(design, solid, listening, buffer)
     strikes = _strike_nodes(design, listening)
     mass = _mass_properties(design)
-    body = {
+    body: dict[str, Any] = {
         "name": name,
         "mesh": 0,
-        "children": list(range(2, 2 + len(strikes))),
+        "children": list(range(1, 1 + len(strikes))),
         "extensions": {
             EXTENSION: {"modalModel": 0, "gain": gain},
             PHYSICS: {
                 "motion": mass,
-                "collider": {"geometry": {"node": 1, "convexHull": True}},
+                "collider": {"geometry": {"node": 0, "convexHull": True}},
             },
         },
     }
@@ -128,16 +128,15 @@ def gltf_document(
         for number, node in enumerate(strikes):
             node["extensions"] = {gltf_audio.EXTENSION: {"emitters": [number]}}
     up = up or ("z" if upright(str(design.settings.get("mesh", ""))) is None else "y")
-    root: dict[str, Any] = {"name": f"{up} points up", "children": [1]}
     if up in _TURNS:
-        root["rotation"] = _TURNS[up]
+        body["rotation"] = _TURNS[up]
     document = {
         "asset": {"version": "2.0", "generator": f"Carillon {__version__}", "extras": drafts},
         "extensionsUsed": list(drafts),
         "extensions": extensions,
         "scene": 0,
-        "scenes": [{"name": name, "nodes": [0]}],
-        "nodes": [root, body, *strikes],
+        "scenes": [{"nodes": [0]}],
+        "nodes": [body, *strikes],
         "meshes": [mesh],
         "materials": [surface_material(design)],
         **buffer.entries(),
