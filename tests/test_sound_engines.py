@@ -84,13 +84,21 @@ def rendered(point: int, strength: float, contact: float, rate: int, seconds: fl
 
 def test_a_folder_has_sounds_their_levels_and_models(folder):
     files = sorted(str(each.relative_to(folder / "pan")) for each in (folder / "pan").rglob("*"))
-    assert files == sorted(
-        [*MODELS, "sounds", "sounds.csv", "sounds.json"] + [f"sounds/{each}" for each in SOUNDS]
-    )
+    tables = ["sounds", "sounds-wwise.txt", "sounds.csv", "sounds.json"]
+    assert files == sorted([*MODELS, *tables, *(f"sounds/{each}" for each in SOUNDS)])
     assert [row["file"] for row in levels(folder / "pan")] == SOUNDS
     told = json.loads((folder / "pan/sounds.json").read_text())
     assert [row["file"] for row in told["sounds"]] == SOUNDS
     assert set(told["columns"]) == set(told["sounds"][0])
+
+
+def test_wwise_gets_containers_and_volumes(folder):
+    text = (folder / "pan/sounds-wwise.txt").read_text()
+    rows = list(csv.DictReader(io.StringIO(text), delimiter="\t"))
+    assert [row["Audio File"] for row in rows] == [f"sounds\\{file}" for file in SOUNDS]
+    assert len({row["Object Path"].split("\\")[0] for row in rows}) == 4
+    for row, level in zip(rows, levels(folder / "pan"), strict=True):
+        assert float(row["Property[Volume]"]) == pytest.approx(float(level["gain_db"]), abs=1e-4)
 
 
 def test_sounds_have_24_bits_one_peak_and_silent_ends(folder):

@@ -106,7 +106,7 @@ def _write_folder(
             f"{options.out}: {len(written.levels)} sounds of {points} points, "
             f"{len(sounds.strengths)} strengths and {sounds.variations} variations, 24 bits at "
             f"{sounds.rate:,} Hz; levels in sounds.csv and sounds.json; "
-            f"{len(written.files) - len(written.levels) - 2} models; {size:,} bytes"
+            f"{len(written.files) - len(written.levels) - 3} models; {size:,} bytes"
         ),
     }
 

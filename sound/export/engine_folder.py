@@ -22,10 +22,13 @@ from sound.export.modal_table import impact_objects, write_modal_csv, write_moda
 from sound.export.sound_set import file_names, rendered_set, require_count
 from sound.export.sound_set_options import SoundSetOptions
 from sound.export.web_audio import web_audio_module
+from sound.export.wwise import wwise_import
 from sound.project.design import Design
 
 SOUNDS = "sounds"
 """Name of the folder of sounds, and of the tables beside it."""
+WWISE = f"{SOUNDS}-wwise.txt"
+"""Name of the list that Wwise imports."""
 STAGING = ".carillon-export-"
 """Beginning of the name of the folder in which all is written before it gets its place."""
 
@@ -117,11 +120,14 @@ def _write_all(
             say(f"{file} is left out: {error}")
             missing.append(file)
     levels = with_gains(made)
+    (folder / WWISE).write_text(wwise_import(levels, SOUNDS))
     (folder / f"{SOUNDS}.csv").write_text(levels_csv(levels))
     text = levels_json(model.name, levels, options.rate, options.seed)
     (folder / f"{SOUNDS}.json").write_text(text)
     sounds = [f"{SOUNDS}/{level.file}" for level in levels]
-    return WrittenFolder([*sounds, *files, f"{SOUNDS}.csv", f"{SOUNDS}.json"], levels, missing)
+    return WrittenFolder(
+        [*sounds, *files, WWISE, f"{SOUNDS}.csv", f"{SOUNDS}.json"], levels, missing
+    )
 
 
 def _models(
