@@ -154,6 +154,19 @@ def test_gltf_has_normals_and_the_material_as_colours(folder):
     assert document["meshes"][0]["primitives"][0]["material"] < len(document["materials"])
 
 
+@pytest.mark.parametrize("inverted", [False, True])
+def test_normals_point_out_of_the_solid_and_into_cavities(inverted):
+    outer, cavity = trimesh.creation.icosphere(radius=0.2), trimesh.creation.icosphere(radius=0.1)
+    cavity.invert()
+    surface = trimesh.util.concatenate([outer, cavity])
+    if inverted:
+        surface.invert()
+    vertices, faces, normals = shaded(surface.vertices, surface.faces)
+    outwards = (vertices * normals).sum(axis=1) > 0.0
+    np.testing.assert_array_equal(outwards, np.linalg.norm(vertices, axis=1) > 0.15)
+    assert len(faces) == len(surface.faces)
+
+
 def test_stiffer_is_lighter():
     colours = colours_of(np.geomspace(1e9, 1e11, 101))
     assert (np.diff(colours[:, :3] @ (0.2126, 0.7152, 0.0722)) > 0.0).all()

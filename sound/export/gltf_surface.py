@@ -52,14 +52,18 @@ def surface_material(design: Design) -> dict[str, Any]:
 
 
 def shaded(vertices: Array, faces: Any) -> tuple[Array, Any, Array]:
-    """Vertices (v, 3), triangles (f, 3) and unit normals (v, 3) of a surface that is to be seen."""
+    """Vertices (v, 3), triangles (f, 3) and unit normals (v, 3) of a surface that is to be seen.
+
+    Triangles (F, 3) of `faces` on `vertices` (V, 3) are turned alike; those returned face outwards.
+    """
     import trimesh
 
     surface = trimesh.Trimesh(vertices, faces, process=False)
     surface.merge_vertices()
     surface.update_faces(surface.nondegenerate_faces())
     surface.remove_unreferenced_vertices()
-    trimesh.repair.fix_normals(surface, multibody=True)
+    if surface.volume < 0.0:  # its faces are turned alike, those of cavities too
+        surface.invert()
     smooth = trimesh.graph.smooth_shade(surface, angle=np.radians(CREASE_DEGREES))
     normals = np.array(smooth.vertex_normals)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
