@@ -227,7 +227,7 @@ def test_tables_have_frequencies_decays_and_amplitudes(folder):
 
 
 def test_impact_objects_ring_as_the_points_do(folder):
-    """The plug-in makes of a row sum a exp(-d t) cos(2 pi f t), with amplitudes of one factor."""
+    """Rows are amplitude, decay, frequency; the amplitudes of all points have one factor."""
     model = ModalModel.of_design(small_design())
     factors = []
     for number, point in enumerate(("corner", "side")):
