@@ -846,14 +846,22 @@ class Design:
         return render(self, at, **how)
 
     def export(self, path: str | Path, points: int = 0) -> None:
-        """Write it for other tools: .h5, .gltf, .glb, .dsp (Faust) or .npy (moduli).
+        """Write it for other tools: .h5, .gltf, .glb, .dsp (Faust), .js (Web Audio), .json or .csv
+        (tables of modes), .npy (moduli), or a folder, ending in `/`, of sounds and models.
 
         Raises UserError if the ending tells no format, or the file cannot be written. `points`:
-        struck points of a Faust program, besides the targets'.
+        struck points of models and sounds, besides the targets'.
         """
-        from sound.export.formats import export_design, format_of
+        from sound.export.formats import FOLDER, ExportSettings, export_design, format_of
 
-        export_design(path, self.found, format_of(str(path)), points)
+        kind, settings = format_of(str(path)), ExportSettings(points=points)
+        if kind != FOLDER:
+            export_design(path, self.found, kind, settings)
+            return
+        from sound.export.engine_folder import write_engine_folder
+        from sound.export.sound_set_options import SoundSetOptions
+
+        write_engine_folder(path, self.found, SoundSetOptions(), settings)
 
     def save(self, path: str | Path) -> None:
         """Write a design file, which all commands read.

@@ -1,4 +1,4 @@
-"""Export a design: for game engines, for Faust, and its moduli for an analysis on a finer mesh.
+"""Export a design: for game engines, Faust, browsers, and its moduli for analyses on finer meshes.
 
 The picture shows the stiffness that the search gave the bar.
 """
@@ -16,7 +16,7 @@ if __name__ == "__main__":
     target = {"name": "end", "vertex": 0, "clip": "clip.wav"}
     settings = {"evaluations": 100, "workers": 1}
     design = ca.design(mesh="builtin:bar", resolution=20, targets=[target], optimiser=settings)
-    for name in ("bar.glb", "bar.dsp", "bar.npy", "bar.h5"):
+    for name in ("bar.glb", "bar.dsp", "bar.js", "bar.csv", "bar.npy", "bar.h5"):
         design.export(name)
         print(f"{name}: {Path(name).stat().st_size:,} bytes")
 

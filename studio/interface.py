@@ -9,7 +9,7 @@ from studio.feed import Feed
 
 CLIP_PARTS = ("sound", "modes", "rest", "noise")
 """Parts of a clip that can be heard."""
-EXPORTS = ("h5", "gltf", "glb", "dsp", "npy", "wav", "html")
+EXPORTS = ("h5", "gltf", "glb", "dsp", "npy", "wav", "html", "zip")
 """Kinds of files that a design can be taken home as."""
 
 

@@ -19,12 +19,14 @@ from solver.response.points import interpolation
 from solver.verification.audit import audit
 from solver.verification.comparison import compare_files
 from sound.__main__ import main
-from sound.export.gltf import EXTENSION
+from sound.export.gltf import EXTENSION, PHYSICS
+from sound.export.gltf_surface import colours_of, shaded
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
+from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.sinusoids import Bank, ring
-from tests.gltf_files import accessor, read_gltf
+from tests.gltf_files import accessor, read_gltf, rms, sound_of, validated
 from tests.programs import run
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.solids import box_mesh
@@ -117,15 +119,85 @@ def test_the_embedding_carries_modes_to_the_surface(folder):
 @pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
 def test_gltf_is_the_surface(folder, name):
     loaded = trimesh.load(folder / name).to_geometry()
+    # Vertices on edges are there once for each face.
+    loaded.merge_vertices(merge_norm=True)
     assert loaded.is_watertight
     assert loaded.volume == pytest.approx(np.prod(SIDES), rel=1e-6)
-    np.testing.assert_allclose(loaded.bounds, [[0, 0, 0], SIDES], atol=1e-7)
+    x, y, z = SIDES  # z points up
+    np.testing.assert_allclose(loaded.bounds, [[0, 0, -y], [x, z, 0]], atol=1e-7)
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z"])
+def test_the_axis_that_points_up_becomes_y(folder, tmp_path, up):
+    words = ["--up", up, "--out", str(tmp_path / "pan.glb")]
+    assert main(["export", str(folder / "design.h5"), *words]) == 0
+    loaded = trimesh.load(tmp_path / "pan.glb").to_geometry()
+    assert np.ptp(loaded.bounds, axis=0)[1] == pytest.approx(SIDES["xyz".index(up)])
+    assert loaded.volume == pytest.approx(np.prod(SIDES), rel=1e-6)
+
+
+def test_gltf_has_normals_and_the_material_as_colours(folder):
+    document, data = read_gltf(folder / "pan.glb")
+    ((surface,),) = (mesh["primitives"] for mesh in document["meshes"])
+    positions, normals, colours = (
+        accessor(document, data, surface["attributes"][name])
+        for name in ("POSITION", "NORMAL", "COLOR_0")
+    )
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
+    # Those of a box stand upright on its faces, and point away from its middle.
+    assert np.abs(normals).max(axis=1).min() > 1.0 - 1e-6
+    assert (((positions - np.array(SIDES) / 2) * normals).sum(axis=1) > 0.0).all()
+    design = small_design()
+    vertices, _, _ = shaded(design.surface_vertices, design.surface_faces)
+    np.testing.assert_allclose(positions, vertices, atol=1e-7)
+    np.testing.assert_allclose(colours, colours_of(design.young_near(vertices)), atol=1e-6)
+    assert document["meshes"][0]["primitives"][0]["material"] < len(document["materials"])
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_normals_point_out_of_the_solid_and_into_cavities(inverted):
+    outer, cavity = trimesh.creation.icosphere(radius=0.2), trimesh.creation.icosphere(radius=0.1)
+    cavity.invert()
+    surface = trimesh.util.concatenate([outer, cavity])
+    if inverted:
+        surface.invert()
+    vertices, faces, normals = shaded(surface.vertices, surface.faces)
+    outwards = (vertices * normals).sum(axis=1) > 0.0
+    np.testing.assert_array_equal(outwards, np.linalg.norm(vertices, axis=1) > 0.15)
+    assert len(faces) == len(surface.faces)
+
+
+def test_stiffer_is_lighter():
+    colours = colours_of(np.geomspace(1e9, 1e11, 101))
+    assert (np.diff(colours[:, :3] @ (0.2126, 0.7152, 0.0722)) > 0.0).all()
+    assert len(np.unique(colours_of(np.full(3, 2e9)), axis=0)) == 1
+
+
+def test_gltf_has_the_mass_and_the_sounds_of_strikes(folder):
+    document, data = read_gltf(folder / "pan.glb")
+    physics = document["nodes"][0]["extensions"][PHYSICS]
+    properties = mass_properties(small_design().model)
+    assert physics["motion"]["mass"] == pytest.approx(properties.mass)
+    assert physics["collider"]["geometry"]["node"] == 0
+    sounds = document["extensions"]["KHR_audio_emitter"]
+    for node, strike in zip(document["nodes"][1:], small_design().strikes, strict=True):
+        (number,) = node["extensions"]["KHR_audio_emitter"]["emitters"]
+        emitter = sounds["emitters"][number]
+        assert emitter["type"] == "positional" and node["name"] == strike.name
+        source = sounds["sources"][emitter["sources"][0]]
+        samples, rate = sound_of(document, data, sounds["audio"][source["audio"]])
+        assert rate == 48_000 and "autoplay" not in source
+        solid = SoundingSolid.of_design(small_design())
+        listening = Listening.of_design(small_design(), solid)
+        hit = Hit(0.0, strike.position, strike.inward)
+        truth = render(solid, [hit], len(samples) / rate, rate, listening=listening)
+        assert 20.0 * np.log10(rms(source["gain"] * samples - truth) / rms(truth)) < -25.0
 
 
 @pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
 def test_a_player_of_the_draft_makes_the_designed_sound(folder, name):
     document, data = read_gltf(folder / name)
-    assert document["extensionsUsed"] == [EXTENSION]
+    assert document["extensionsUsed"] == [EXTENSION, PHYSICS, "KHR_audio_emitter"]
     model = document["extensions"][EXTENSION]["modalModels"][0]
     f, d = (accessor(document, data, model[key])[:, 0] for key in ("frequencies", "decayRates"))
     positions = accessor(document, data, model["positions"])
@@ -141,6 +213,11 @@ def test_a_player_of_the_draft_makes_the_designed_sound(folder, name):
         played = gain * 2 * np.pi * f * (shapes[:, nearest] @ strike.inward)
         own = np.abs(played) * listening[row] / np.mean(listening)
         np.testing.assert_allclose(own, target_amplitudes()[row, order], rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["pan.gltf", "pan.glb"])
+def test_khronos_validator_finds_nothing_wrong(folder, name):
+    validated(folder / name)
 
 
 def test_the_loudest_modes_come_first(folder):
@@ -212,6 +289,7 @@ def test_a_force_that_takes_time_has_the_same_impulse_in_faust(player):
 
 def test_faust_s_program_names_points_and_units(folder):
     text = (folder / "pan.dsp").read_text()
+    assert 'declare name "design";' in text  # of the design, not of the file
     assert "nPositions = 5;" in text and f"nModes = {N_MODES};" in text
     assert "'corner':0;'side':1;'vertex " in text
     assert "N s" in text and "kg^-1/2" in text

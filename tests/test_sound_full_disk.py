@@ -43,6 +43,9 @@ def small_disk(tmp_path_factory) -> Iterator[Path]:
         ["export", "design.h5", "--out", "OUT.gltf"],
         ["export", "design.h5", "--out", "OUT.glb"],
         ["export", "design.h5", "--points", "300", "--out", "OUT.dsp"],
+        ["export", "design.h5", "--points", "30", "--out", "OUT.js"],
+        ["export", "design.h5", "--points", "30", "--out", "OUT.json"],
+        ["export", "design.h5", "--variations", "1", "--out", "OUT/"],
     ],
     ids=" ".join,
 )

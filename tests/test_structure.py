@@ -96,7 +96,7 @@ ARROWS = {
     "sound.scenes.film": "sound sound.scenes",
     "sound.scenes.contact": "sound.scenes",
     "sound.export": """solver.assembly solver.files solver.response solver.verification
-        sound.project sound.rendering sound.scenes""",
+        sound sound.project sound.rendering sound.scenes""",
     "sound.scenes.audible": "sound.rendering sound.scenes sound.scenes.contact sound.synthesis",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export
         sound.project sound.rendering""",

@@ -181,7 +181,7 @@ def test_exports_are_made_where_nothing_was_planted(folder, monkeypatch):
         async def designed(state):
             return "design.h5"
 
-        async def make(name, design, kind, target, out, seconds):
+        async def make(call, design, kind, target, out, name, seconds):
             with atomic_path(out) as temporary:
                 temporary.write_bytes(b"moduli")
 

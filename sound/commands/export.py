@@ -3,58 +3,112 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.command_line import add_options, collect
-from carillon.parameters.quantities import between
 from sound.commands.common_options import DampingOptions
-from sound.export.formats import FORMATS, format_of
+from sound.export.formats import FOLDER, FORMATS, ExportSettings, format_of
+from sound.export.sound_set_options import SoundSetOptions
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
     from sound.project.design import Design
 
-MOST_POINTS = 10_000
-"""To strike in a Faust program, each of which is an entry of its menu."""
-
 
 @parameters
 class ExportOptions:
-    """What is exported, and how."""
+    """What is exported, and where to."""
 
     design: str = option(REQUIRED, "design.h5")
     out: str = option(
         REQUIRED,
-        "file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, .dsp (Faust), or .npy "
-        "(Young's moduli [Pa] of the fine cells, for carillon modes --material)",
+        "file to write: .h5 (embedded mesh with eigenpairs), .gltf, .glb, .dsp (Faust), .js (Web "
+        "Audio), .json, .csv (tables of modes), or .npy (Young's moduli [Pa] of the fine cells, "
+        "for carillon modes --material); or a folder, ending in /, of sounds with their levels and "
+        "all models, for game engines",
     )
     format: Annotated[str, OneOf(*FORMATS)] | None = option(None, "where --out has another ending")
-    points: Annotated[int, between(0, MOST_POINTS)] = option(
-        0,
-        "for Faust: points to strike all over the surface, besides the targets'",
-    )
+    json: bool = option(False, "print what was written as JSON")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser, ExportOptions, positional=("design",))
+    add_options(parser, ExportSettings)
+    add_options(parser, SoundSetOptions)
     add_options(parser, DampingOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the file and say what it holds."""
-    from sound.export.formats import export_design
-    from sound.outputs import require_output
+    """Write the file or folder and say what it holds."""
     from sound.project.design_file import read_design
 
-    options = collect(ExportOptions, arguments)
+    options, settings = collect(ExportOptions, arguments), collect(ExportSettings, arguments)
     kind = format_of(options.out, options.format)
-    require_output(options.out, [Path(options.out).suffix.lower()], [options.design])
+    _require_output(options, kind)
     design = read_design(options.design).damped_by(collect(DampingOptions, arguments).damping_from)
-    export_design(options.out, design, kind, options.points, options.design)
-    print(f"{options.out}: {_content(kind, design)}, {Path(options.out).stat().st_size:,} bytes")
+    if kind == FOLDER:
+        told = _write_folder(options, design, settings, collect(SoundSetOptions, arguments))
+    else:
+        told = _write_file(options, design, kind, settings)
+    print(json.dumps(told) if options.json else told["sentence"])
     return 0
+
+
+def _require_output(options: ExportOptions, kind: str) -> None:
+    if kind == FOLDER:
+        from sound.export.engine_folder import require_folder
+
+        require_folder(options.out)
+    else:
+        from sound.outputs import require_output
+
+        require_output(options.out, [Path(options.out).suffix.lower()], [options.design])
+
+
+def _write_file(
+    options: ExportOptions, design: Design, kind: str, settings: ExportSettings
+) -> dict[str, Any]:
+    from sound.export.formats import export_design
+
+    name = Path(options.design).stem
+    export_design(options.out, design, kind, settings, options.design, name)
+    size = Path(options.out).stat().st_size
+    return {
+        "out": options.out,
+        "format": kind,
+        "bytes": size,
+        "sentence": f"{options.out}: {_content(kind, design)}, {size:,} bytes",
+    }
+
+
+def _write_folder(
+    options: ExportOptions, design: Design, settings: ExportSettings, sounds: SoundSetOptions
+) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from sound.export.engine_folder import write_engine_folder
+
+    name = Path(options.design).stem
+    written = write_engine_folder(options.out, design, sounds, settings, name)
+    size = sum((Path(options.out) / file).stat().st_size for file in written.files)
+    points = len({level.point for level in written.levels})
+    return {
+        "out": options.out,
+        "format": FOLDER,
+        "bytes": size,
+        "files": written.files,
+        "missing": written.missing,
+        "sounds": [asdict(level) for level in written.levels],
+        "sentence": (
+            f"{options.out}: {len(written.levels)} sounds of {points} points, "
+            f"{len(sounds.strengths)} strengths and {sounds.variations} variations, 24 bits at "
+            f"{sounds.rate:,} Hz; levels in sounds.csv and sounds.json; "
+            f"{len(written.files) - len(written.levels) - 3} models; {size:,} bytes"
+        ),
+    }
 
 
 def _content(kind: str, design: Design) -> str:

@@ -6,23 +6,14 @@ Here every mode is a rotation in the plane that decays, with the impulse respons
 a exp(-d t) sin(2 pi f t) exactly.
 """
 
-import re
 from pathlib import Path
 from string import Template
 from typing import Any
 
-import numpy as np
-
 from carillon import __version__
 from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
-from sound.project.design import Design
-from sound.rendering.listening import Listening
-from sound.rendering.render import DECAY_NEPERS
-from sound.rendering.solid import SoundingSolid
-
-LEAST_DAMPING = 1e-3
-"""Least damping [1/s], since Faust's models need finite decay times."""
+from sound.export.modal_model import ModalModel, plain
 
 _TEMPLATE = Template("""\
 declare name "$name";
@@ -73,65 +64,35 @@ process = force(gate, contact) * impulse : model(position);
 """)
 
 
-def write_faust(path: str | Path, design: Design, points: int) -> None:
-    """Write a `.dsp` with the targets' struck points and `points` others all over the surface.
+def write_faust(path: str | Path, model: ModalModel) -> None:
+    """Write a `.dsp` that strikes the points of a model; its name is that of the model.
 
     Raises UserError if the file cannot be written.
     """
-    text = faust_program(design, points, Path(path).stem)
+    text = faust_program(model)
     with atomic_path(path) as temporary:
         temporary.write_text(text)
 
 
-def faust_program(design: Design, points: int, name: str) -> str:
+def faust_program(model: ModalModel) -> str:
     """The program's text."""
-    solid = SoundingSolid.of_design(design)
-    listening = Listening.of_design(design, solid)
-    names, positions, inward = _struck_points(design, points)
-    gains = np.array([[listening.gain(position)] for position in positions])
-    amplitudes = gains * solid.amplitudes(positions, inward)
-    t60s = DECAY_NEPERS / np.maximum(solid.dampings, LEAST_DAMPING)
+    names = [plain(point.name) for point in model.points]
     listed = [
-        f"//   {number} {label}: {', '.join(f'{x:.6g}' for x in position)}"
-        for number, (label, position) in enumerate(zip(names, positions))
+        f"//   {number} {label}: {', '.join(f'{x:.6g}' for x in point.position)}"
+        for number, (label, point) in enumerate(zip(names, model.points))
     ]
     content: dict[str, Any] = {
-        "name": _plain(name),
+        "name": plain(model.name),
         "version": __version__,
         "points": "\n".join(listed),
-        "n_modes": len(solid.frequencies),
+        "n_modes": len(model.frequencies),
         "n_positions": len(names),
-        "frequencies": _numbers(solid.frequencies),
-        "t60s": _numbers(t60s),
-        "amplitudes": _numbers(amplitudes.ravel()),
+        "frequencies": _numbers(model.frequencies),
+        "t60s": _numbers(model.decay_times),
+        "amplitudes": _numbers(model.amplitudes.ravel()),
         "menu": ";".join(f"'{label}':{number}" for number, label in enumerate(names)),
     }
     return _TEMPLATE.substitute(content)
-
-
-def _struck_points(design: Design, points: int) -> tuple[list[str], Array, Array]:
-    """Names, positions (p, 3) and inward normals (p, 3) of the targets and of other points."""
-    import trimesh
-
-    from solver.response.vertices import inward_normals, spread
-
-    strikes = design.strikes
-    positions = np.array([strike.position for strike in strikes])
-    inward = np.array([strike.inward for strike in strikes])
-    names = [_plain(strike.name) for strike in strikes]
-    if points:
-        used = np.unique(design.surface_faces)
-        chosen = used[spread(design.surface_vertices[used], positions, points)]
-        others = design.surface_vertices[chosen]
-        surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
-        positions = np.concatenate([positions, others])
-        inward = np.concatenate([inward, inward_normals(surface, others)])
-        names += [f"vertex {vertex}" for vertex in chosen]
-    return names, positions, inward
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^\w .+-]", "_", name)
 
 
 def _numbers(values: Array) -> str:

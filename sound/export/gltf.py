@@ -1,6 +1,11 @@
 """glTF 2.0: the surface with its modal model, by the draft extension KHR_audio_rigid_bodies.
 
-The extension is a draft (Karl Hiner, repository glTF_PhysicalAudio, folder
+Beside it are the mass properties (draft KHR_physics_rigid_bodies, repository
+eoineoineoin/glTF_Physics, commit ac5c413), with the convex hull as collider, and the sound of a
+strike of 1 N s at each target, see `sound.export.gltf_audio`.  The solid's node turns the axis
+that points up to glTF's y.
+
+KHR_audio_rigid_bodies is a draft (Karl Hiner, repository glTF_PhysicalAudio, folder
 extensions/2.0/Khronos/KHR_audio_rigid_bodies; state of 2026, with `modalModels`,
 `acousticMaterials` and the radiation factor 2 pi f_n in its synthesis).  A player that follows it
 makes of an impulse j at a point p
@@ -12,9 +17,6 @@ times f_1 / f_n, f_1 being the lowest frequency: the player's sound then is the 
 asks for such data "in the same form", and the factors stand in the model's extras.
 """
 
-import base64
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -22,17 +24,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon import __version__
+from carillon.arrays import Array
 from carillon.fem.model import mass_properties
-from carillon.files.atomic import atomic_path
+from sound.export import gltf_audio
+from sound.export.gltf_asset import (
+    FLOAT,
+    TRIANGLES,
+    UNSIGNED_INT,
+    VERTICES,
+    Buffer,
+    write_asset,
+)
+from sound.export.gltf_material import acoustic_material
+from sound.export.gltf_surface import surface_material, surface_mesh
 from sound.project.design import Design
 from sound.rendering.listening import Listening
+from sound.rendering.render import Hit, render, ringing_seconds
 from sound.rendering.solid import SoundingSolid
+from sound.scenes.bodies import upright
 
 EXTENSION = "KHR_audio_rigid_bodies"
+PHYSICS = "KHR_physics_rigid_bodies"
 DRAFT = (
     "draft by Karl Hiner, repository glTF_PhysicalAudio, "
     "extensions/2.0/Khronos/KHR_audio_rigid_bodies, 2026"
 )
+PHYSICS_DRAFT = (
+    "draft, repository eoineoineoin/glTF_Physics, "
+    "extensions/2.0/Khronos/KHR_physics_rigid_bodies, commit ac5c413"
+)
+AXES = ("x", "y", "z")
+"""Axes of the mesh that may point up."""
+_TURNS = {"x": (0.0, 0.0, 0.5**0.5, 0.5**0.5), "z": (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)}
+"""Quaternions (x, y, z, w) that turn an axis to y."""
+SOUND_RATE = 48_000
+"""Samples per second of the strikes' sounds."""
 UNITS = {
     "positions": "m, axes of the original mesh",
     "frequencies": "Hz",
@@ -46,111 +72,94 @@ UNITS = {
     "beta": "s",
     "output": "full scale is 1",
 }
-FLOAT, UNSIGNED_INT = 5126, 5125
-VERTICES, TRIANGLES = 34962, 34963
-_ALIGNMENT = 4
-_WIDTHS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-_MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
-class Buffer:
-    """Data of accessors, one view each, aligned to four bytes as all of them are."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(self, values: NDArray[Any], component: int, target: int | None = None) -> int:
-        """Append values (n,), (n, 3) or (n, 4); returns the number of their accessor."""
-        rows = values.reshape(len(values), -1).astype("<f4" if component == FLOAT else "<u4")
-        self.accessors.append(
-            {
-                "bufferView": self.add_bytes(rows.tobytes(), target),
-                "componentType": component,
-                "count": len(rows),
-                "type": _WIDTHS[rows.shape[1]],
-                "min": rows.min(axis=0).tolist(),
-                "max": rows.max(axis=0).tolist(),
-            }
-        )
-        return len(self.accessors) - 1
-
-    def add_bytes(self, raw: bytes, target: int | None = None) -> int:
-        """Append bytes, such as a file; returns the number of their view."""
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(raw)}
-        self.views.append(view if target is None else {**view, "target": target})
-        self.data += raw + b"\0" * (-len(raw) % _ALIGNMENT)
-        return len(self.views) - 1
-
-    def entries(self) -> dict[str, Any]:
-        """Entries of a document that describe the buffer."""
-        return {
-            "accessors": self.accessors,
-            "bufferViews": self.views,
-            "buffers": [{"byteLength": len(self.data)}],
-        }
-
-
-def write_asset(path: str | Path, document: dict[str, Any], data: bytes, binary: bool) -> None:
-    """Write `.glb` if `binary`, else `.gltf` with the data, the document's only buffer, embedded in
-    it.
-
-    Raises UserError if the file cannot be written.
-    """
-    with atomic_path(path) as temporary:
-        if binary:
-            temporary.write_bytes(_glb(document, data))
-        else:
-            text = base64.b64encode(data).decode()
-            document["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{text}"
-            temporary.write_text(json.dumps(document))
-
-
-def _glb(document: dict[str, Any], data: bytes) -> bytes:
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % _ALIGNMENT)
-    data += b"\0" * (-len(data) % _ALIGNMENT)
-    length = 12 + 8 + len(text) + 8 + len(data)
-    return b"".join(
-        [
-            struct.pack("<III", _MAGIC, 2, length),
-            struct.pack("<II", len(text), _JSON),
-            text,
-            struct.pack("<II", len(data), _BIN),
-            data,
-        ]
-    )
-
-
-def write_gltf(path: str | Path, design: Design, binary: bool) -> None:
+def write_gltf(
+    path: str | Path,
+    design: Design,
+    binary: bool,
+    up: str | None = None,
+    name: str | None = None,
+) -> None:
     """Write `.glb` if `binary`, else `.gltf` with the data embedded in it.
 
-    Raises UserError if the file cannot be written.
+    `up` is the axis of the mesh that points up, one of `AXES`; by default y of solids from glTF
+    files, and z of others.  Raises UserError if the file cannot be written.
     """
-    write_asset(path, *gltf_document(design), binary)
+    write_asset(path, *gltf_document(design, up, name), binary)
 
 
-def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
+def gltf_document(
+    design: Design, up: str | None = None, name: str | None = None
+) -> tuple[dict[str, Any], bytes]:
     """The asset as JSON and its buffer."""
+    name = name or design.name
     solid = SoundingSolid.of_design(design)
     listening = Listening.of_design(design, solid)
+    buffer = Buffer()
+    mesh = surface_mesh(design, buffer)
+    model, gain = _modal_model(design, solid, listening, buffer)
+    strikes = _strike_nodes(design, listening)
+    mass = _mass_properties(design)
+    body: dict[str, Any] = {
+        "name": name,
+        "mesh": 0,
+        "children": list(range(1, 1 + len(strikes))),
+        "extensions": {
+            EXTENSION: {"modalModel": 0, "gain": gain},
+            PHYSICS: {
+                "motion": mass,
+                "collider": {"geometry": {"node": 0, "convexHull": True}},
+            },
+        },
+    }
+    extensions: dict[str, Any] = {
+        EXTENSION: {
+            "modalModels": [{**model, "massProperties": mass}],
+            "acousticMaterials": [acoustic_material(design)],
+        }
+    }
+    drafts = {EXTENSION: DRAFT, PHYSICS: PHYSICS_DRAFT}
+    sounds = _sounds(design, solid, listening)
+    audio = gltf_audio.audio_of(sounds, SOUND_RATE, buffer, positional=True, autoplay=False)
+    if audio is not None:
+        extensions[gltf_audio.EXTENSION] = audio
+        drafts[gltf_audio.EXTENSION] = gltf_audio.DRAFT
+        for number, node in enumerate(strikes):
+            node["extensions"] = {gltf_audio.EXTENSION: {"emitters": [number]}}
+    up = up or ("z" if upright(str(design.settings.get("mesh", ""))) is None else "y")
+    if up in _TURNS:
+        body["rotation"] = _TURNS[up]
+    document = {
+        "asset": {"version": "2.0", "generator": f"Carillon {__version__}", "extras": drafts},
+        "extensionsUsed": list(drafts),
+        "extensions": extensions,
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [body, *strikes],
+        "meshes": [mesh],
+        "materials": [surface_material(design)],
+        **buffer.entries(),
+    }
+    return document, bytes(buffer.data)
+
+
+def _modal_model(
+    design: Design, solid: SoundingSolid, listening: Listening, buffer: Buffer
+) -> tuple[dict[str, Any], float]:
+    """The model without its mass, and the gain of its node."""
     order = _loudest_first(design, solid, listening)
     lowest = float(solid.frequencies.min())
     scales = lowest / solid.frequencies[order]
     shapes = solid.motion(design.surface_vertices).transpose(2, 0, 1)[order]
-    buffer = Buffer()
-    positions = buffer.add(design.surface_vertices, FLOAT, VERTICES)
-    indices = buffer.add(design.surface_faces.ravel(), UNSIGNED_INT, TRIANGLES)
     model = {
         "name": "modes",
         "frequencies": buffer.add(solid.frequencies[order], FLOAT),
         "decayRates": buffer.add(solid.dampings[order], FLOAT),
-        "positions": positions,
+        "positions": buffer.add(design.surface_vertices, FLOAT, VERTICES),
         "shapes": buffer.add((shapes * scales[:, None, None]).reshape(-1, 3), FLOAT),
-        "indices": indices,
+        "indices": buffer.add(design.surface_faces.ravel(), UNSIGNED_INT, TRIANGLES),
         "material": 0,
-        "massProperties": _mass_properties(design),
         "extras": {
             "modeNumbers": (order + 1).tolist(),
             "shapeScales": scales.tolist(),
@@ -159,33 +168,25 @@ def gltf_document(design: Design) -> tuple[dict[str, Any], bytes]:
         },
     }
     # A player has one gain for the whole body; nodes have the gains of the struck points.
-    gain = float(listening.gains.mean()) / (2.0 * np.pi * lowest)
-    strikes = _strike_nodes(design, listening)
-    body = {
-        "name": "object",
-        "mesh": 0,
-        "children": list(range(1, 1 + len(strikes))),
-        "extensions": {EXTENSION: {"modalModel": 0, "gain": gain}},
-    }
-    document = {
-        "asset": {
-            "version": "2.0",
-            "generator": f"Carillon {__version__}",
-            "extras": {EXTENSION: DRAFT},
-        },
-        "extensionsUsed": [EXTENSION],
-        "extensions": {
-            EXTENSION: {"modalModels": [model], "acousticMaterials": [_material(design)]}
-        },
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [body, *strikes],
-        "meshes": [
-            {"primitives": [{"attributes": {"POSITION": positions}, "indices": indices}]},
-        ],
-        **buffer.entries(),
-    }
-    return document, bytes(buffer.data)
+    return model, float(listening.gains.mean()) / (2.0 * np.pi * lowest)
+
+
+def _sounds(design: Design, solid: SoundingSolid, listening: Listening) -> list[tuple[str, Array]]:
+    """Names of the targets, and the sound (s,) of a strike of 1 N s at each."""
+    seconds = ringing_seconds(solid)
+    return [
+        (
+            strike.name,
+            render(
+                solid,
+                [Hit(0.0, strike.position, strike.inward)],
+                seconds,
+                SOUND_RATE,
+                listening=listening,
+            ),
+        )
+        for strike in design.strikes
+    ]
 
 
 def _loudest_first(
@@ -206,50 +207,6 @@ def _mass_properties(design: Design) -> dict[str, Any]:
         "inertiaDiagonal": properties.moments.tolist(),
         "inertiaOrientation": Rotation.from_matrix(properties.axes).as_quat().tolist(),
     }
-
-
-def _material(design: Design) -> dict[str, Any]:
-    """Constants of the solid, without alpha and beta, as every mode has its own damping."""
-    regions = design.model.regions
-    poisson = regions.mean_poisson if regions.poisson is None else regions.poisson
-    several = {} if design.fine_region is None else {"regions": _regions(design)}
-    if not several and not regions.is_isotropic:
-        several["regions"] = _regions(design)
-    return {
-        "name": "designed",
-        "density": design.model.density,
-        "youngsModulus": float(design.young.mean()),
-        "poissonRatio": poisson,
-        "extras": {
-            "youngsModulus": "mean over the volume; it varies between "
-            f"{design.young.min():.6g} and {design.young.max():.6g} Pa",
-            **several,
-        },
-    }
-
-
-def _regions(design: Design) -> list[dict[str, Any]]:
-    """Materials of the regions, wood of several directions a row for each."""
-    table, rows = design.model.regions, design.fine_region
-    found = []
-    for row, name in enumerate(table.names):
-        young = design.young if rows is None else design.young[rows == row]
-        law = table.laws[row]
-        own: dict[str, Any] = {"name": name, "density": float(table.density[row])}
-        if len(young):
-            own |= {
-                "youngsModulus": float(young.mean()),
-                "youngsModulusRange": [float(young.min()), float(young.max())],
-            }
-        if law.poisson is not None:
-            own["poissonRatio"] = law.poisson
-        else:
-            own["elasticity"] = law.matrix.tolist()
-        damping = table.damping[row]
-        if damping is not None:
-            own |= {"alpha": damping[0], "beta": damping[1]}
-        found.append(own)
-    return found
 
 
 def _strike_nodes(design: Design, listening: Listening) -> list[dict[str, Any]]:

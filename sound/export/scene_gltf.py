@@ -1,14 +1,12 @@
 """glTF 2.0 of a played scene: moving objects, camera and sound.
 
-The motion is an ordinary animation.  The sound is in the draft extension KHR_audio_emitter
-(repository omigroup/gltf-extensions, folder extensions/2.0/KHR_audio_emitter, commit b48a264;
-KhronosGroup/glTF, pull request 2137), as a global emitter: the sound at two ears has no position.
-Players that do not know the draft show the scene silently.
+The motion is an ordinary animation.  The sound is in the draft extension KHR_audio_emitter, see
+`sound.export.gltf_audio`, as a global emitter: the sound at two ears has no position.  Players that
+do not know the draft show the scene silently.
 
 glTF's y points up and the scene's z: a root node turns all of it.
 """
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,7 @@ import numpy as np
 
 from carillon import __version__
 from carillon.arrays import Array, Integers
-from sound.export.gltf import (
+from sound.export.gltf_asset import (
     FLOAT,
     TRIANGLES,
     UNSIGNED_INT,
@@ -24,12 +22,9 @@ from sound.export.gltf import (
     Buffer,
     write_asset,
 )
+from sound.export.gltf_audio import DRAFT, EXTENSION, audio_of
 from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture, linear_light
 
-EXTENSION = "KHR_audio_emitter"
-DRAFT = (
-    "draft, repository omigroup/gltf-extensions, extensions/2.0/KHR_audio_emitter, commit b48a264"
-)
 UPRIGHT = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
 """Quaternion (x, y, z, w) that turns z to y."""
 ROUGHNESS = 0.5
@@ -63,26 +58,35 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
         "rotation": UPRIGHT,
         "children": list(range(1, 1 + len(nodes))),
     }
-    emitter = {EXTENSION: {"emitters": [0]}}
     camera = picture.camera  # sees as far as to infinity
     perspective = {"yfov": float(np.radians(camera.degrees)), "znear": NEAREST * _distance(camera)}
-    document = {
+    document: dict[str, Any] = {
         "asset": {
             "version": "2.0",
             "generator": f"Carillon {__version__}",
-            "extras": {EXTENSION: DRAFT, "sound": "begins with the animation, at time 0"},
         },
-        "extensionsUsed": [EXTENSION],
-        "extensions": {EXTENSION: _emitters(performance, buffer)},
         "scene": 0,
-        "scenes": [{"name": performance.title, "nodes": [0], "extensions": emitter}],
+        "scenes": [{"name": performance.title, "nodes": [0]}],
         "nodes": [root, *nodes],
         **_surfaces(seen, buffer),
         "cameras": [{"type": "perspective", "perspective": perspective}],
         "animations": [{"name": "motion", "channels": channels, "samplers": samplers}],
-        **buffer.entries(),
     }
-    return document, bytes(buffer.data)
+    _add_sound(document, performance, buffer)
+    return document | buffer.entries(), bytes(buffer.data)
+
+
+def _add_sound(document: dict[str, Any], performance: Performance, buffer: Buffer) -> None:
+    """The sound of the whole scene, played once, equally loud everywhere."""
+    sounds = [("sound", performance.sound)]
+    audio = audio_of(sounds, performance.rate, buffer, positional=False, autoplay=True)
+    if audio is None:
+        return
+    extras = {EXTENSION: DRAFT, "sound": "begins with the animation, at time 0"}
+    document["asset"]["extras"] = extras
+    document["extensionsUsed"] = [EXTENSION]
+    document["extensions"] = {EXTENSION: audio}
+    document["scenes"][0]["extensions"] = {EXTENSION: {"emitters": [0]}}
 
 
 def _object_nodes(picture: Picture) -> list[dict[str, Any]]:
@@ -201,21 +205,3 @@ def _camera_node(camera: Camera) -> dict[str, Any]:
 
 def _distance(camera: Camera) -> float:
     return float(np.linalg.norm(np.subtract(camera.position, camera.target)))
-
-
-def _emitters(performance: Performance, buffer: Buffer) -> dict[str, Any]:
-    """The sound, played once, equally loud everywhere.
-
-    Its samples have 16 bits, which all players support, scaled to full range; the gain undoes the
-    scale.
-    """
-    import soundfile
-
-    peak = float(np.abs(performance.sound).max(initial=0.0)) or 1.0
-    wav = io.BytesIO()
-    soundfile.write(wav, performance.sound / peak, performance.rate, "PCM_16", format="WAV")
-    return {
-        "audio": [{"bufferView": buffer.add_bytes(wav.getvalue()), "mimeType": "audio/wav"}],
-        "sources": [{"name": "sound", "audio": 0, "gain": peak, "autoPlay": True}],
-        "emitters": [{"name": "ears", "type": "global", "sources": [0]}],
-    }

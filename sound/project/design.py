@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -95,6 +96,12 @@ class Design:
     """Loss factors of the material, and dampings by them; None in old designs."""
     fine_region: RegionOf | None = None
     """(M,) region of each fine cell, a row of the model's regions; None if there is one."""
+
+    @property
+    def name(self) -> str:
+        """What the solid is called: the name of its mesh, without folders."""
+        mesh = str(self.settings.get("mesh", "")) or "solid"
+        return PurePath(mesh.removeprefix("builtin:")).stem or "solid"
 
     @property
     def unit(self) -> float:

@@ -1,9 +1,13 @@
 """A design in other forms, for other tools."""
 
+from pathlib import Path
+
 from carillon.errors import UserError
 from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import write_wav
+from sound.export.engine_folder import write_engine_folder, zipped
 from sound.export.formats import export_design
+from sound.export.sound_set_options import SoundSetOptions
 from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
@@ -14,8 +18,8 @@ from sound.rendering.solid import SoundingSolid
 class Exports:
     """What the process for exports does."""
 
-    def make(self, design: str, kind: str, target: str | None, out: str) -> None:
-        """Write a design in the form `kind` to the file `out`."""
+    def make(self, design: str, kind: str, target: str | None, out: str, name: str) -> None:
+        """Write a design in the form `kind` to the file `out`; models in it have the name."""
         finished = read_design(design)
         if kind == "wav":
             _write_strike(finished, target, out)
@@ -23,8 +27,17 @@ class Exports:
             from studio.standalone import write_page
 
             write_page(out, finished)
+        elif kind == "zip":
+            _write_folder(finished, Path(out), name)
         else:
-            export_design(out, finished, kind)
+            export_design(out, finished, kind, name=name)
+
+
+def _write_folder(design: Design, out: Path, name: str) -> None:
+    """The folder for game engines, as `carillon export` makes it, as a ZIP file."""
+    folder = out.parent / name
+    write_engine_folder(folder, design, SoundSetOptions(), name=name)
+    zipped(folder, out)
 
 
 def _write_strike(design: Design, target: str | None, out: str) -> None:

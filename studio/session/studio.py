@@ -24,6 +24,7 @@ MEDIA_TYPES = {
     "npy": "application/octet-stream",
     "wav": "audio/wav",
     "html": "text/html",
+    "zip": "application/zip",
 }
 """Media type of a file by its ending."""
 
@@ -87,12 +88,13 @@ class DesignStudio:
 
     async def export(self, kind: str, target: str | None) -> Download:
         """The design in another form."""
-        design = await designed(self.session)
+        design, name = await designed(self.session), self.session.name
         with self.session.workspace.exporting() as folder:
             out = folder / f"export.{kind}"
-            await self._exports.call("make", design, kind, target, str(out), seconds=EXPORT_SECONDS)
+            await self._exports.call(
+                "make", design, kind, target, str(out), name, seconds=EXPORT_SECONDS
+            )
             content = out.read_bytes()
-        name = self.session.name
         stem = name if target is None or kind != "wav" else f"{name}-{target}"
         return Download(f"{stem}.{kind}", MEDIA_TYPES[kind], content)
 

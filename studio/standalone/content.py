@@ -1,6 +1,5 @@
 """What a page of a design holds of it: surface, material, modes, targets, in few bytes."""
 
-from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ def content(design: Design) -> bytes:
     targets = design.targets
     header: dict[str, Any] = {
         "event": "design",
-        "name": name_of(design),
+        "name": design.name,
         "targets": [{"name": each.name, "vertex": int(each.vertex)} for each in design.strikes],
         "amplitudes": targets.amplitudes.tolist(),
         "cents": cents(solid.frequencies, targets.frequencies).tolist(),
@@ -87,12 +86,6 @@ def halved(gains: Array) -> tuple[Array, Array]:
     shares = np.divide(gains, loudest, out=np.zeros_like(gains), where=loudest > 0.0)
     halves = np.ascontiguousarray(shares.T).astype("<f2").view("u1").reshape(-1, 2).T
     return loudest, np.ascontiguousarray(halves).ravel().view("<u2")
-
-
-def name_of(design: Design) -> str:
-    """What the solid is called: the name of its mesh, without folders."""
-    mesh = str(design.settings.get("mesh", "")) or "solid"
-    return PurePath(mesh.removeprefix("builtin:")).stem or "solid"
 
 
 def _gains(design: Design, solid: SoundingSolid, listening: Listening) -> Array:

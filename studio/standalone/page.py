@@ -16,7 +16,7 @@ from carillon import __version__
 from carillon.command_line.progress import say
 from carillon.files.atomic import atomic_path
 from sound.project.design import Design
-from studio.standalone.content import content, name_of
+from studio.standalone.content import content
 
 HERE = Path(__file__).resolve().parent
 STUDIO = HERE.parent
@@ -54,7 +54,7 @@ def write_page(path: str | Path, design: Design) -> None:
 
 def page_of(design: Design) -> str:
     """The page as text."""
-    return assembled(HERE, PROCESSOR, STYLES, name_of(design), content(design))
+    return assembled(HERE, PROCESSOR, STYLES, design.name, content(design))
 
 
 def assembled(

@@ -343,7 +343,7 @@ hostile("render on a full disk", RENDER, "make room", file_size=1000)
 
 # export -------------------------------------------------------------------------------------------
 
-for end in ("h5", "gltf", "glb", "dsp"):
+for end in ("h5", "gltf", "glb", "dsp", "js", "json", "csv"):
     hostile(
         f"export {end} on a full disk",
         f"export ZOO/design.h5 --out o.{end}",
@@ -377,6 +377,13 @@ hostile(
 each(
     "points", "export ZOO/design.h5 --out o.dsp --points VALUE", "-1 1.5 2**64 1000000000", "points"
 )
+hostile(
+    "export a folder on a full disk", "export ZOO/design.h5 --out o/", "make room", file_size=1000
+)
+hostile("export a folder to a file", "export ZOO/design.h5 --out o/", files={"o": Place("null")})
+each("strengths", "export ZOO/design.h5 --out o/ --strengths VALUE", "0 -1 nan 1e9 x", "strengths")
+each("variations", "export ZOO/design.h5 --out o/ --variations VALUE", "0 1.5 99", "variations")
+each("up", "export ZOO/design.h5 --out o.glb --up VALUE", "w -z ''", "up")
 hostile("no such format", "export ZOO/design.h5 --out o.glb --format obj", "--format")
 
 # Controls -----------------------------------------------------------------------------------------
@@ -402,5 +409,5 @@ control(
 control("render", RENDER, "o.wav")
 control("strikes", STRIKES, "o.wav", files={"s.csv": "time_seconds,target\n0,end\n0.1,end\n"})
 control("render modes", "render ZOO/modes.h5 --at 0.1 0.075 0.1 --seconds 0.1 --out o.wav", "o.wav")
-for end in ("h5", "gltf", "glb", "dsp"):
+for end in ("h5", "gltf", "glb", "dsp", "js", "json", "csv"):
     control(f"export {end}", f"export ZOO/design.h5 --out o.{end}", f"o.{end}")

@@ -7,6 +7,7 @@ import { button, make } from "./dom.js";
 const KINDS = [
   ["html", "Page", "one file that anybody can open and strike, without a network"],
   ["h5", "Design (HDF5)", "modes, material and clips; carillon render and export read it"],
+  ["zip", "For game engines (ZIP)", "sounds with a table of levels, model, modes for FMOD, Wwise, Unity, Unreal, Godot"],
   ["wav", "Sound (WAV)", "the solid struck at the selected target"],
   ["glb", "Model (GLB)", "surface with the material as colours and the modes, in one file"],
   ["gltf", "Model (glTF)", "the same as text"],

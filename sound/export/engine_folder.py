@@ -1,0 +1,157 @@
+"""A folder of all that a game engine takes of a design: sounds with their levels, model, modes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from carillon.command_line.progress import say
+from carillon.errors import UserError
+from carillon.files.held_folder import HeldFolder
+from carillon.files.paths import cause, require_plain
+from sound.export.faust import faust_program
+from sound.export.formats import ExportSettings
+from sound.export.gltf import write_gltf
+from sound.export.levels import SoundLevel, levels_csv, levels_json, with_gains
+from sound.export.modal_model import ModalModel
+from sound.export.modal_table import impact_objects, write_modal_csv, write_modal_json
+from sound.export.sound_set import file_names, rendered_set, require_count
+from sound.export.sound_set_options import SoundSetOptions
+from sound.export.web_audio import web_audio_module
+from sound.export.wwise import wwise_import
+from sound.project.design import Design
+
+SOUNDS = "sounds"
+"""Name of the folder of sounds, and of the tables beside it."""
+WWISE = f"{SOUNDS}-wwise.txt"
+"""Name of the list that Wwise imports."""
+STAGING = ".carillon-export-"
+"""Beginning of the name of the folder in which all is written before it gets its place."""
+
+
+@dataclass(frozen=True)
+class WrittenFolder:
+    """What was written: names of files in the folder, levels of the sounds, and what is missing."""
+
+    files: list[str]
+    levels: list[SoundLevel]
+    missing: list[str] = field(default_factory=list)
+
+
+def require_folder(path: str | Path) -> Path:
+    """Check, before the work, that a folder can be filled: it is there, or can be made.
+
+    Raises UserError if it cannot.
+    """
+    path = Path(path)
+    require_plain(path)
+    if path.exists() and not path.is_dir():
+        raise UserError(f"{path}: is there and is no folder; name another")
+    parent = path if path.is_dir() else path.absolute().parent
+    if not parent.is_dir():
+        raise UserError(f"{path}: the folder {parent} does not exist; create it first")
+    if not os.access(parent, os.W_OK):
+        raise UserError(f"{path}: cannot be written; name a folder you may write to")
+    return path
+
+
+def write_engine_folder(
+    path: str | Path,
+    design: Design,
+    options: SoundSetOptions,
+    settings: ExportSettings | None = None,
+    name: str | None = None,
+) -> WrittenFolder:
+    """Fill a folder, made if it is missing: sounds, their levels, glTF, Faust, Web Audio, tables.
+
+    Files of the same names are replaced, once all are written; others stay, as game engines keep
+    their own beside them.  A model that fails does not take the sounds along: a line of progress
+    says why.  Raises UserError if the sounds are too many or the folder cannot be written.
+    """
+    settings = settings or ExportSettings()
+    model = ModalModel.of_design(design, settings.points, name)
+    require_count(len(model.points), options)
+    path = require_folder(path)
+    is_new = not path.exists()
+    try:
+        path.mkdir(exist_ok=True)
+        folder = HeldFolder(path)
+        try:
+            folder.remove_passing(STAGING)
+            with folder.passing(STAGING) as staged:
+                written = _write_all(staged, design, model, options, settings)
+                for file in written.files:
+                    target = path / file
+                    target.parent.mkdir(exist_ok=True)
+                    os.replace(staged / file, target)
+        finally:
+            folder.close()
+            if is_new and not any(path.iterdir()):
+                path.rmdir()
+    except OSError as error:
+        raise UserError(f"{path}: could not be written ({cause(error)})") from error
+    return written
+
+
+def _write_all(
+    folder: Path,
+    design: Design,
+    model: ModalModel,
+    options: SoundSetOptions,
+    settings: ExportSettings,
+) -> WrittenFolder:
+    """Tables of sounds are the last files: who finds them, finds what they name."""
+    label = file_names([model.name])[0]
+    (folder / SOUNDS).mkdir()
+    made = []
+    for sound in rendered_set(design, model.name, model.points, options):
+        (folder / SOUNDS / sound.level.file).write_bytes(sound.content)
+        made.append((sound.gain, sound.level))
+    files, missing = [], []
+    for file, write in _models(design, model, settings, label).items():
+        try:
+            write(folder / file)
+            files.append(file)
+        except UserError as error:
+            say(f"{file} is left out: {error}")
+            missing.append(file)
+    levels = with_gains(made)
+    (folder / WWISE).write_text(wwise_import(levels, SOUNDS))
+    (folder / f"{SOUNDS}.csv").write_text(levels_csv(levels))
+    text = levels_json(model.name, levels, options.rate, options.seed)
+    (folder / f"{SOUNDS}.json").write_text(text)
+    sounds = [f"{SOUNDS}/{level.file}" for level in levels]
+    return WrittenFolder(
+        [*sounds, *files, WWISE, f"{SOUNDS}.csv", f"{SOUNDS}.json"], levels, missing
+    )
+
+
+def _models(
+    design: Design, model: ModalModel, settings: ExportSettings, label: str
+) -> dict[str, Callable[[Path], object]]:
+    """By file, what writes it."""
+    writers: dict[str, Callable[[Path], object]] = {
+        f"{label}.glb": lambda path: write_gltf(path, design, True, settings.up, model.name),
+        f"{label}.dsp": lambda path: path.write_text(faust_program(model)),
+        f"{label}.js": lambda path: path.write_text(web_audio_module(model), encoding="utf-8"),
+        f"{label}-modes.json": lambda path: write_modal_json(path, model),
+        f"{label}-modes.csv": lambda path: write_modal_csv(path, model),
+    }
+    names = file_names([point.name for point in model.points])
+    for each, text in zip(names, impact_objects(model), strict=True):
+        writers[f"{label}_{each}.impobj"] = partial(_write_text, text)
+    return writers
+
+
+def _write_text(text: str, path: Path) -> None:
+    path.write_text(text)
+
+
+def zipped(folder: Path, archive: Path) -> None:
+    """Pack a folder as a ZIP file of the same name in it."""
+    made = shutil.make_archive(str(archive.with_suffix("")), "zip", folder.parent, folder.name)
+    os.replace(made, archive)

@@ -1,0 +1,101 @@
+"""The table of levels of a set of sounds, which tells how loud the strikes were to each other."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from carillon import __version__
+from sound.export.mastering import PEAK_DECIBELS
+
+COLUMNS = {
+    "file": "name of the WAV file",
+    "point": "name of the struck point",
+    "strength_newton_seconds": "impulse along the inward normal",
+    "variation": "1 at the point itself, others near to it",
+    "gain_db": "to play the file with, so that all files are as loud to each other as the strikes",
+    "peak_db": "peak of the file, below full scale",
+    "rms_db": "root mean square of the file, below full scale",
+    "rendered_peak_db": "peak of the sound before it was scaled; clips of targets have full scale",
+    "seconds": "length of the file",
+    "contact_seconds": "duration of the force",
+    "x_m": "where it was struck, in the axes of the mesh",
+    "y_m": "",
+    "z_m": "",
+}
+"""Columns of the table of levels, and what they mean."""
+
+
+@dataclass(frozen=True)
+class SoundLevel:
+    """A row of the table of levels, see `COLUMNS`."""
+
+    file: str
+    point: str
+    strength_newton_seconds: float
+    variation: int
+    gain_db: float
+    peak_db: float
+    rms_db: float
+    rendered_peak_db: float
+    seconds: float
+    contact_seconds: float
+    x_m: float
+    y_m: float
+    z_m: float
+
+
+def with_gains(sounds: Sequence[tuple[float, SoundLevel]]) -> list[SoundLevel]:
+    """Rows with the gains [dB] that make files as loud to each other as the strikes were.
+
+    `sounds`: what each sound was multiplied by, and its row.  The greatest gain is 0 dB.
+    """
+    least = min(gain for gain, _ in sounds)
+    return [
+        SoundLevel(**{**asdict(level), "gain_db": decibels(least / gain) + 0.0})
+        for gain, level in sounds
+    ]
+
+
+def levels_csv(levels: Sequence[SoundLevel]) -> str:
+    """The table of levels as CSV."""
+    content = io.StringIO()
+    table = csv.writer(content, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for level in levels:
+        cells = asdict(level).values()
+        table.writerow([f"{cell:.6g}" if isinstance(cell, float) else cell for cell in cells])
+    return content.getvalue()
+
+
+def levels_json(name: str, levels: Sequence[SoundLevel], rate: int, seed: int) -> str:
+    """The table of levels as JSON, with the sampling rate [Hz] and the seed of the variations."""
+    content: dict[str, Any] = {
+        "format": "carillon sound set 1",
+        "generator": f"Carillon {__version__}",
+        "name": name,
+        "peak_db": PEAK_DECIBELS,
+        "rate_hz": rate,
+        "bits": 24,
+        "seed": seed,
+        "columns": COLUMNS,
+        "sounds": [asdict(level) for level in levels],
+    }
+    return json.dumps(content, indent=1)
+
+
+def decibels(ratio: float) -> float:
+    """A ratio of amplitudes in dB; that of 0 is -240 dB.
+
+    Examples
+    --------
+    >>> decibels(0.1), decibels(0.0)
+    (-20.0, -240.0)
+    """
+    return 20.0 * float(np.log10(max(ratio, 1e-12)))

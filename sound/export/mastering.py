@@ -1,0 +1,51 @@
+"""Levels and endings of sounds that game engines play: trimmed, faded, at one peak, of 24 bits."""
+
+import io
+
+import numpy as np
+
+from carillon.arrays import Array
+
+PEAK_DECIBELS = -1.0
+"""Peak of a sound [dB of full scale]: converters and codecs overshoot a little."""
+TAIL_DECIBELS = -60.0
+"""SoundLevel below the peak [dB] from which on the end of a sound is cut."""
+FADE_SECONDS = 0.02
+"""Time in which an end at that level fades to silence."""
+LONG_FADE_SECONDS = 1.0
+"""The same of a sound that still rings at its end, a quarter of its length at most."""
+
+
+def mastered(sound: Array, rate: int) -> tuple[Array, float]:
+    """A sound (s,) without its inaudible end, faded, at the peak, and what it was multiplied by.
+
+    Silence stays as it is, times 1.
+
+    Examples
+    --------
+    >>> ringing = 0.25 * np.exp(-np.arange(8000) / 500.0)
+    >>> made, gain = mastered(ringing, 8000)
+    >>> len(made), float(made[0].round(4)), float(made[-1]), round(gain, 4)
+    (3454, 0.8913, 0.0, 3.565)
+    """
+    largest = float(np.abs(sound).max(initial=0.0))
+    if largest == 0.0:
+        return sound, 1.0
+    last = int(np.flatnonzero(np.abs(sound) > largest * 10.0 ** (TAIL_DECIBELS / 20.0))[-1])
+    faded = sound[: last + 1].copy()
+    rings = last + 1 > len(sound) - FADE_SECONDS * rate
+    seconds = min(LONG_FADE_SECONDS, len(sound) / rate / 4.0) if rings else FADE_SECONDS
+    count = min(len(faded), max(1, round(seconds * rate)))
+    faded[len(faded) - count :] *= 0.5 + 0.5 * np.cos(np.pi * np.arange(1, count + 1) / count)
+    # The fade may take the largest sample along where a sound is shorter.
+    gain = 10.0 ** (PEAK_DECIBELS / 20.0) / float(np.abs(faded).max())
+    return gain * faded, gain
+
+
+def wav_of_24_bits(sound: Array, rate: int) -> bytes:
+    """Samples (s,) as the content of a WAV file of 24-bit integers; full scale is 1."""
+    import soundfile  # Slow to load.
+
+    content = io.BytesIO()
+    soundfile.write(content, sound, rate, "PCM_24", format="WAV")
+    return content.getvalue()

@@ -1,0 +1,150 @@
+"""Sounds of one design for a game engine: points, strengths and variations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from carillon.arrays import Array
+from carillon.errors import UserError
+from sound.export.levels import SoundLevel, decibels
+from sound.export.mastering import mastered, wav_of_24_bits
+from sound.export.modal_model import StruckPoint
+from sound.export.sound_set_options import SoundSetOptions
+from sound.project.design import Design
+from sound.rendering.listening import Listening
+from sound.rendering.render import Hit, render, ringing_seconds
+from sound.rendering.solid import SoundingSolid
+from sound.strikes import longest_side
+
+MOST_SOUNDS = 2_000
+"""Greatest number of sounds of a set."""
+NEARBY = 0.06
+"""Greatest distance of a variation's point from its own, over the surface's longest side."""
+TRIALS = 4096
+"""Random points among which those near by are looked for."""
+HERTZ_EXPONENT = -0.2
+"""A contact lasts as the speed, and so the impulse, to this power (Johnson, Contact Mechanics,
+section 11.4)."""
+
+
+@dataclass(frozen=True)
+class SetSound:
+    """A sound of a set: its file's name and content, and its row of the table.
+
+    `gain` is what the rendered sound was multiplied by.
+    """
+
+    content: bytes
+    gain: float
+    level: SoundLevel
+
+
+def require_count(points: int, options: SoundSetOptions) -> None:
+    """Refuse a set of too many sounds.
+
+    Raises UserError if there were more than `MOST_SOUNDS`.
+    """
+    count = points * len(options.strengths) * options.variations
+    if count > MOST_SOUNDS:
+        raise UserError(
+            f"{points:,} points, {len(options.strengths)} strengths and {options.variations} "
+            f"variations make {count:,} sounds, expected at most {MOST_SOUNDS:,}; name fewer"
+        )
+
+
+def rendered_set(
+    design: Design, name: str, points: Sequence[StruckPoint], options: SoundSetOptions
+) -> Iterator[SetSound]:
+    """The sounds of points, strengths (the softest first) and variations, one after the other.
+
+    Each is mastered by itself, see `sound.export.mastering`.  `gain_db` of its level is 0 here,
+    since it needs all of them, see `sound.export.levels.with_gains`.  The points of variations
+    depend on the seed and on the number of their own point alone.  Raises UserError if the sounds
+    are too many.
+    """
+    require_count(len(points), options)
+    solid = SoundingSolid.of_design(design)
+    listening = Listening.of_design(design, solid)
+    seconds = ringing_seconds(solid)
+    strengths = sorted(options.strengths)
+    for row, (label, point) in enumerate(zip(file_names([each.name for each in points]), points)):
+        near = _points_near(design, point, options, row)
+        for number, strength in enumerate(strengths, start=1):
+            contact = options.contact_seconds * (strength / strengths[-1]) ** HERTZ_EXPONENT
+            for variation, (position, inward) in enumerate(near, start=1):
+                hit = Hit(0.0, position, strength * inward)
+                sound = render(solid, [hit], seconds, options.rate, contact, listening)
+                made, gain = mastered(sound, options.rate)
+                level = SoundLevel(
+                    f"{file_names([name])[0]}_{label}_s{number}_v{variation}.wav",
+                    point.name,
+                    strength,
+                    variation,
+                    0.0,
+                    decibels(float(np.abs(made).max(initial=0.0))),
+                    decibels(float(np.sqrt(np.mean(made**2)))),
+                    decibels(float(np.abs(sound).max(initial=0.0))),
+                    len(made) / options.rate,
+                    contact,
+                    *position.tolist(),
+                )
+                yield SetSound(wav_of_24_bits(made, options.rate), gain, level)
+
+
+def _points_near(
+    design: Design, point: StruckPoint, options: SoundSetOptions, row: int
+) -> list[tuple[Array, Array]]:
+    """Positions and inward normals of the variations: the point, then others at random near to it.
+
+    They lie on the surface evenly; a direction is that of the nearest vertex.
+    """
+    import trimesh
+
+    from solver.response.vertices import inward_normals
+
+    found = [(point.position, point.inward)]
+    count = options.variations - 1
+    if not count:
+        return found
+    surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
+    reach = NEARBY * longest_side(surface)
+    corners = np.asarray(surface.triangles)
+    middles = corners.mean(axis=1)
+    sizes = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+    near = np.linalg.norm(middles - point.position, axis=1) < reach + sizes
+    areas = np.where(near, surface.area_faces, 0.0)
+    random = np.random.default_rng([options.seed, row])
+    triangles = corners[random.choice(len(corners), TRIALS, p=areas / areas.sum())]
+    first, second = random.uniform(size=(2, TRIALS, 1))
+    side = np.sqrt(first)  # evenly over a triangle (Turk, Graphics Gems, 1990)
+    weights = np.concatenate([1.0 - side, side * (1.0 - second), side * second], axis=1)
+    positions = np.einsum("tk,tkx->tx", weights, triangles)
+    away = np.linalg.norm(positions - point.position, axis=1)
+    # Those within reach come first, in the order in which they were drawn.
+    positions = positions[np.argsort(away > reach, kind="stable")[:count]]
+    return found + list(zip(positions, inward_normals(surface, positions)))
+
+
+def file_names(names: Sequence[str]) -> list[str]:
+    """Names as parts of files' names, each a different one: small letters, digits, `-`.
+
+    Examples
+    --------
+    >>> file_names(["Rim left", "rim-left", "鐘"])
+    ['rim-left', 'rim-left-2', 'point']
+    """
+    taken: set[str] = set()
+    found = []
+    for name in names:
+        base = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "point"
+        own, number = base, 1
+        while own in taken:
+            number += 1
+            own = f"{base}-{number}"
+        taken.add(own)
+        found.append(own)
+    return found

@@ -1,0 +1,284 @@
+"""What game engines and browsers take of a design: folders of sounds, tables of modes, modules."""
+
+import base64
+import csv
+import io
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from sound.__main__ import main
+from sound.export.engine_folder import STAGING
+from sound.export.modal_model import ModalModel
+from sound.export.sound_set import NEARBY
+from sound.project.design_file import write_design
+from sound.rendering.listening import Listening
+from sound.rendering.render import Hit, render
+from sound.rendering.solid import SoundingSolid
+from studio.processes.exports import Exports
+from tests.chromium import chromium, served
+from tests.gltf_files import validated
+from tests.programs import run
+from tests.small_design import N_MODES, SIDES, small_design
+
+RATE = 44_100
+FEW = ["--strengths", "1", "0.25", "--variations", "2", "--rate", "22050"]
+POINTS = ("corner", "side")
+SOUNDS = [f"pan_{point}_s{s}_v{v}.wav" for point in POINTS for s in (1, 2) for v in (1, 2)]
+MODELS = [
+    "pan-modes.csv",
+    "pan-modes.json",
+    "pan.dsp",
+    "pan.glb",
+    "pan.js",
+    "pan_corner.impobj",
+    "pan_side.impobj",
+]
+NODE = """
+import { pathToFileURL } from "node:url";
+const [path, point, strength, contact, rate] = process.argv.slice(-5);
+const { render } = await import(pathToFileURL(path));
+const samples = render(point, 0.5, +rate, { strength: +strength, contactSeconds: +contact });
+process.stdout.write(Buffer.from(samples.buffer).toString("base64"));
+"""
+BROWSER = """async ([point, strength, contact, rate]) => {
+  const { createSolid } = await import("/pan.js");
+  const context = new OfflineAudioContext(1, rate / 2, rate);
+  const solid = await createSolid(context, [{ point, strength, contactSeconds: contact }]);
+  solid.connect(context.destination);
+  const samples = (await context.startRendering()).getChannelData(0);
+  return Array.from(samples);
+}"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """The design `pan.h5`, and its folder for engines."""
+    path = tmp_path_factory.mktemp("engines")
+    write_design(path / "pan.h5", small_design())
+    assert main(["export", str(path / "pan.h5"), "--out", f"{path / 'pan'}/", *FEW]) == 0
+    for name in ("pan.js", "table.json", "table.csv"):
+        assert main(["export", str(path / "pan.h5"), "--out", str(path / name)]) == 0
+    shutil.copy(path / "pan.js", path / "pan.mjs")
+    return path
+
+
+def levels(folder: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO((folder / "sounds.csv").read_text())))
+
+
+def rendered(point: int, strength: float, contact: float, rate: int, seconds: float) -> np.ndarray:
+    """What `carillon render` makes of a strike at a target, without noise."""
+    design = small_design()
+    solid = SoundingSolid.of_design(design)
+    strike = design.strikes[point]
+    hit = Hit(0.0, strike.position, strength * strike.inward)
+    listening = Listening.of_design(design, solid)
+    return render(solid, [hit], seconds, rate, contact, listening, residual=False)
+
+
+def test_a_folder_has_sounds_their_levels_and_models(folder):
+    files = sorted(str(each.relative_to(folder / "pan")) for each in (folder / "pan").rglob("*"))
+    tables = ["sounds", "sounds-wwise.txt", "sounds.csv", "sounds.json"]
+    assert files == sorted([*MODELS, *tables, *(f"sounds/{each}" for each in SOUNDS)])
+    assert [row["file"] for row in levels(folder / "pan")] == SOUNDS
+    told = json.loads((folder / "pan/sounds.json").read_text())
+    assert [row["file"] for row in told["sounds"]] == SOUNDS
+    assert set(told["columns"]) == set(told["sounds"][0])
+
+
+def test_wwise_gets_containers_and_volumes(folder):
+    text = (folder / "pan/sounds-wwise.txt").read_text()
+    rows = list(csv.DictReader(io.StringIO(text), delimiter="\t"))
+    assert [row["Audio File"] for row in rows] == [f"sounds\\{file}" for file in SOUNDS]
+    assert len({row["Object Path"].split("\\")[0] for row in rows}) == 4
+    for row, level in zip(rows, levels(folder / "pan"), strict=True):
+        assert float(row["Property[Volume]"]) == pytest.approx(float(level["gain_db"]), abs=1e-4)
+
+
+def test_sounds_have_24_bits_one_peak_and_silent_ends(folder):
+    for row in levels(folder / "pan"):
+        path = folder / "pan/sounds" / row["file"]
+        assert soundfile.info(path).subtype == "PCM_24"
+        samples, rate = soundfile.read(path)
+        assert rate == 22_050 and len(samples) / rate == pytest.approx(
+            float(row["seconds"]), abs=1e-5
+        )
+        assert 20.0 * np.log10(np.abs(samples).max()) == pytest.approx(-1.0, abs=1e-3)
+        assert samples[-1] == 0.0 and np.abs(samples[-20:]).max() < 1e-4
+        root = 20.0 * np.log10(np.sqrt(np.mean(samples**2)))
+        assert root == pytest.approx(float(row["rms_db"]), abs=1e-3)
+
+
+def test_gains_make_files_as_loud_to_each_other_as_the_strikes(folder):
+    rows = {row["file"]: row for row in levels(folder / "pan")}
+    assert max(float(row["gain_db"]) for row in rows.values()) == 0.0
+    scales = []
+    design = small_design()
+    solid = SoundingSolid.of_design(design)
+    listening = Listening.of_design(design, solid)
+    for strike in design.strikes:
+        for number, strength in ((1, 0.25), (2, 1.0)):
+            row = rows[f"pan_{strike.name}_s{number}_v1.wav"]
+            samples, rate = soundfile.read(folder / "pan/sounds" / row["file"])
+            contact = 2e-4 * strength**-0.2
+            assert float(row["contact_seconds"]) == pytest.approx(contact, rel=1e-5)
+            hit = Hit(0.0, strike.position, strength * strike.inward)
+            truth = render(solid, [hit], 0.2, rate, contact, listening)
+            start = samples[: len(truth)]
+            scale = float(start @ truth / (truth @ truth))
+            np.testing.assert_allclose(start, scale * truth, atol=2e-6)
+            scales.append(10.0 ** (float(row["gain_db"]) / 20.0) * scale)
+    np.testing.assert_allclose(scales, scales[0], rtol=1e-4)
+
+
+def test_variations_are_struck_near_by_and_the_same_again(folder, tmp_path):
+    rows = {row["file"]: row for row in levels(folder / "pan")}
+    for strike in small_design().strikes:
+        near = rows[f"pan_{strike.name}_s1_v2.wav"]
+        away = np.linalg.norm([float(near[key]) for key in ("x_m", "y_m", "z_m")] - strike.position)
+        assert 0.0 < away < NEARBY * max(SIDES)
+    again, other = tmp_path / "again", tmp_path / "other"
+    for path, seed in ((again, "0"), (other, "5")):
+        words = ["--format", "folder", "--out", str(path), "--seed", seed, *FEW]
+        assert main(["export", str(folder / "pan.h5"), *words]) == 0
+    for file in SOUNDS:
+        content = (folder / "pan/sounds" / file).read_bytes()
+        assert (again / "sounds" / file).read_bytes() == content
+    assert levels(other) != levels(again)
+
+
+def test_a_folder_is_filled_again_beside_what_others_keep_there(folder, tmp_path):
+    path = tmp_path / "pan"
+    (path / "sounds").mkdir(parents=True)
+    (path / "sounds/pan_corner_s1_v1.wav.meta").write_text("of an engine")
+    (path / "pan.glb").write_text("of before")
+    assert main(["export", str(folder / "pan.h5"), "--out", f"{path}/", *FEW]) == 0
+    assert (path / "sounds/pan_corner_s1_v1.wav.meta").read_text() == "of an engine"
+    assert (path / "pan.glb").read_bytes() == (folder / "pan/pan.glb").read_bytes()
+    assert not [each for each in path.iterdir() if each.name.startswith(STAGING)]
+
+
+def test_a_folder_that_fails_leaves_nothing(folder, tmp_path, monkeypatch, refuses):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sound.export.engine_folder.levels_csv", full)
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new'}/", *FEW)
+    assert "No space left on device" in said and not (tmp_path / "new").exists()
+
+
+def test_a_model_that_fails_does_not_take_the_sounds_along(folder, tmp_path, monkeypatch, capsys):
+    from carillon.errors import UserError
+
+    def broken(*_):
+        raise UserError("no normals")
+
+    monkeypatch.setattr("sound.export.engine_folder.write_gltf", broken)
+    words = ["--out", f"{tmp_path / 'new'}/", "--json", *FEW]
+    assert main(["export", str(folder / "pan.h5"), *words]) == 0
+    told = capsys.readouterr()
+    assert "pan.glb is left out: no normals" in told.err
+    assert json.loads(told.out)["missing"] == ["pan.glb"]
+    assert len(list((tmp_path / "new/sounds").iterdir())) == len(SOUNDS)
+
+
+def test_folders_that_cannot_be_are_refused(folder, tmp_path, refuses):
+    (tmp_path / "file").write_text("")
+    said = refuses(
+        main, "export", folder / "pan.h5", "--format", "folder", "--out", tmp_path / "file"
+    )
+    assert "is no folder" in said
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'a/b'}/")
+    assert "create it first" in said
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new.glb'}/")
+    assert "ends in .glb, but a folder is asked for" in said
+    said = refuses(main, "export", folder / "pan.h5", "--out", tmp_path)
+    assert "/ for a folder" in said
+    many = ["--points", "1000", "--variations", "32"]
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new'}/", *many)
+    assert "expected at most 2,000" in said and not (tmp_path / "new").exists()
+
+
+def test_the_model_of_a_folder_is_valid(folder):
+    validated(folder / "pan/pan.glb")
+
+
+def test_tables_have_frequencies_decays_and_amplitudes(folder):
+    model = ModalModel.of_design(small_design())
+    told = json.loads((folder / "table.json").read_text())
+    assert told["name"] == "pan" and len(told["modes"]) == N_MODES
+    columns = {key: np.array([mode[key] for mode in told["modes"]]) for key in told["modes"][0]}
+    np.testing.assert_allclose(columns["frequency_hz"], small_design().frequencies)
+    np.testing.assert_allclose(columns["decay_per_second"], small_design().dampings)
+    np.testing.assert_allclose(np.exp(-columns["decay_per_second"] * columns["t60_seconds"]), 1e-3)
+    assert [point["name"] for point in told["points"]] == ["corner", "side"]
+    np.testing.assert_allclose([point["amplitudes"] for point in told["points"]], model.amplitudes)
+    rows = list(csv.DictReader(io.StringIO((folder / "table.csv").read_text())))
+    for number, point in enumerate(("corner", "side")):
+        written = [float(row[f"amplitude_{point}"]) for row in rows]
+        np.testing.assert_allclose(written, model.amplitudes[number], rtol=1e-8)
+    assert set(told["units"]) >= set(columns) | {"amplitudes", "position_m", "inward"}
+
+
+def test_impact_objects_ring_as_the_points_do(folder):
+    """Rows are amplitude, decay, frequency; the amplitudes of all points have one factor."""
+    model = ModalModel.of_design(small_design())
+    factors = []
+    for number, point in enumerate(("corner", "side")):
+        told = json.loads((folder / f"pan/pan_{point}.impobj").read_text())
+        assert told["Version"] == 1 and len(told["ModalData"]) == 3 * N_MODES
+        amplitudes, decays, hertz = np.array(told["ModalData"]).reshape(-1, 3).T
+        assert (np.diff(amplitudes) <= 0.0).all() and amplitudes.sum() < 1.0 + 1e-6
+        order = [int(np.argmin(np.abs(model.frequencies - each))) for each in hertz]
+        np.testing.assert_allclose(decays, model.dampings[order], rtol=1e-8)
+        factors += list(amplitudes / model.amplitudes[number, order])
+    np.testing.assert_allclose(factors, factors[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("contact", "rate"), [(0.0, RATE), (1.3e-3, 48_000)])
+@pytest.mark.parametrize("point", ["corner", "side"])
+def test_node_plays_what_we_render(folder, point, contact, rate):
+    if shutil.which("node") is None:
+        pytest.skip("node is not installed")
+    words = ("--input-type=module", "-e", NODE, "--", folder / "pan.mjs", point, 2.0, contact, rate)
+    made = np.frombuffer(base64.b64decode(run("node", *words, check=True).stdout))
+    truth = rendered(POINTS.index(point), 2.0, contact, rate, 0.5)
+    np.testing.assert_allclose(made, truth, atol=1e-9 * np.abs(truth).max())
+
+
+def test_a_browser_plays_what_we_render(folder):
+    with chromium() as browser, served(folder) as address:
+        page = browser.new_page()
+        page.goto(address)
+        for number, contact in enumerate((0.0, 1.3e-3)):
+            made = np.array(page.evaluate(BROWSER, [POINTS[number], 2.0, contact, RATE]))
+            truth = rendered(number, 2.0, contact, RATE, 0.5)
+            assert len(made) == len(truth)
+            np.testing.assert_allclose(made, truth, atol=1e-6 * np.abs(truth).max())
+        assert page.evaluate("async () => (await import('/pan.js')).model.name") == "pan"
+
+
+def test_a_module_names_the_points_that_it_has(folder):
+    if shutil.which("node") is None:
+        pytest.skip("node is not installed")
+    words = ("--input-type=module", "-e", NODE, "--", folder / "pan.mjs", "lid", 1.0, 0.0, RATE)
+    assert (
+        "there is no point lid, expected a number below 2 or one of corner, side"
+        in run("node", *words).stderr
+    )
+
+
+def test_the_studio_packs_the_folder(folder, tmp_path):
+    out = tmp_path / "export.zip"
+    Exports().make(str(folder / "pan.h5"), "zip", None, str(out), "my-pan")
+    with zipfile.ZipFile(out) as archive:
+        names = set(archive.namelist())
+        assert 'declare name "my-pan";' in archive.read("my-pan/my-pan.dsp").decode()
+    assert {"my-pan/my-pan.glb", "my-pan/sounds.csv", "my-pan/my-pan.js"} <= names
+    assert sum(name.endswith(".wav") for name in names) == 18
