@@ -1,6 +1,7 @@
 /** Targets: the points that are struck, their clips, and what one can hear of both. */
 
-import { ask, attempt, chosenTarget, clipOf, giveClip, playClip, strikeTarget } from "./chosen.js";
+import { CLIP_ENDINGS } from "../solid/files.js";
+import { ask, attempt, chosenTarget, clipOf, giveClip, mayReplaceClip, playClip, strikeTarget } from "./chosen.js";
 import { button, find, keepList, make, setText, setValue } from "./dom.js";
 import { withSeconds } from "./numbers.js";
 import { makeRecording } from "./recording.js";
@@ -111,7 +112,7 @@ function makeDetails(parts) {
     type: "file",
     class: "hidden",
     id: "target-file",
-    accept: ".wav,audio/wav",
+    accept: CLIP_ENDINGS.join(","),
     tabindex: -1,
     "aria-hidden": "true",
     onchange: upload,
@@ -187,9 +188,12 @@ function makeDetails(parts) {
     }
   }
 
-  function choose() {
+  async function choose() {
     const target = now();
-    if (target) void ask(parts, "change_target", { target: target.name, clip: clips.value || null });
+    const clip = state.current?.clips.find((one) => one.clip === clips.value);
+    if (!target) return;
+    if (clip && !(await mayReplaceClip(parts, target.name, clip.name))) show();
+    else await ask(parts, "change_target", { target: target.name, clip: clip?.clip ?? null });
   }
 
   async function upload() {
