@@ -46,7 +46,8 @@ def clip_entry(
         "message": None,
         "seconds": 1.2,
         "rate_hz": 44100,
-        "explained_decibels": 13.6,
+        "progress": None,
+        "explained": 0.9563,
         "says": ["its first 12 ms are left out"],
         "modes": modes,
     }
