@@ -127,8 +127,9 @@ def bank(
     return pack(header, arrays)
 
 
-def progress(seconds: float, cost: float) -> dict[str, Any]:
+def progress(seconds: float, cost: float, *checks: dict[str, float]) -> dict[str, Any]:
     return {
+        "checks": list(checks),
         "event": "progress",
         "seconds": seconds,
         "evaluations": int(10 * seconds) + 1,
@@ -200,7 +201,7 @@ class Panels:
         self._socket = socket
         socket.on_message(self._reply)
         self.tell(self.state)
-        self.tell({"event": "history", "rows": []})
+        self.tell({"event": "history", "rows": [], "checks": []})
         if self.state["solid"]:
             self.tell(bank())
 

@@ -182,7 +182,7 @@ class StubStudio:
     def subscribe(self) -> Feed:
         feed = Feed()
         feed.send(self.state(), newest="state")
-        feed.send({"event": "history", "rows": self._history}, newest="history")
+        feed.send({"event": "history", "rows": self._history, "checks": []}, newest="history")
         feed.put(self.bank(), newest="bank")
         self.feeds.add(feed)
         return feed
@@ -251,7 +251,7 @@ class StubStudio:
             }
             self._history.append(row)
             for feed in self.feeds:
-                feed.send({"event": "progress", **row}, newest="progress")
+                feed.send({"event": "progress", **row, "checks": []}, newest="progress")
             self.changed()
         self._search, self._phase = None, "idle"
         self.changed()

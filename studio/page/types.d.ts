@@ -156,6 +156,14 @@ export interface Progress {
   regulariser: number;
 }
 
+/** What was found on the fine solid after so many seconds of a search. */
+export interface FineCheck {
+  seconds: number;
+  cost: number;
+  coarse_rms_cents: number;
+  fine_rms_cents: number;
+}
+
 export interface ArrayHeader {
   name: string;
   type: "f4" | "f8" | "u4" | "u2";

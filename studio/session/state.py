@@ -104,7 +104,7 @@ class StudioState:
         self.placed.set()
 
     def _history_event(self) -> dict[str, Any]:
-        return {"event": "history", "rows": self.search.rows}
+        return {"event": "history", "rows": self.search.rows, "checks": self.search.checks}
 
     def _progressed(self, news: dict[str, Any]) -> None:
         if self._phase != self.search.phase:
