@@ -163,7 +163,7 @@ def test_the_time_of_a_search_is_processor_time(problem, monkeypatch, fine_check
     options = {"seconds": 20.0, "evaluations": None, "workers": 1, "fine_check": fine_check}
     design = optimise(with_options(problem, **options))
     assert 15 <= len(made) <= 25
-    assert design.history["seconds"][-1] == pytest.approx(design.evidence["seconds"])
+    assert 15.0 <= design.history["seconds"][-1] <= design.evidence["seconds"]
 
 
 def test_processes_side_by_side_take_the_time_of_the_slowest(problem):

@@ -271,7 +271,7 @@ function shortly(clip) {
   if (!clip) return "no clip";
   const said = {
     waiting: "waits",
-    listening: `finding modes \u2026${percent(clip)}`,
+    listening: `finding modes${percent(clip)}`,
     ready: `${clip.modes.length} modes`,
     failed: "failed",
     stopped: "stopped",

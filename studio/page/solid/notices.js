@@ -25,7 +25,7 @@ export function makeNotices(element, parts, silent) {
     <div class="empty" hidden>
       <h2>I want to make sounds</h2>
       <p>Open an example or a solid of your own, and press anywhere on it: it sounds. To make it sound like a
-        recording, drop that onto the point that was struck, and press <em>Optimise</em>.</p>
+        recording, give that to the point that was struck, and press <em>Optimise</em>.</p>
       <div class="chooser"></div>
     </div>
     <div class="notice progress" hidden>
