@@ -97,7 +97,12 @@ def state(**changes: Any) -> dict[str, Any]:
 
 
 def bank(
-    hertz: np.ndarray = NOW, number: int = 1, wanted: bool = True, rigid_motions: int = 6
+    hertz: np.ndarray = NOW,
+    number: int = 1,
+    wanted: bool = True,
+    rigid_motions: int = 6,
+    cost: float = 0.4,
+    checked: bool = False,
 ) -> bytes:
     """The bank of a triangle whose modes are a little off."""
     told = {
@@ -111,7 +116,8 @@ def bank(
         "number": number,
         "surface": 3,
         "fine": False,
-        "cost": 0.4,
+        "cost": cost,
+        "checked": checked,
         "rigid_motions": rigid_motions,
         "rms_cents": float(np.sqrt(np.mean((1200 * np.log2(hertz / WANTED)) ** 2))),
         "targets": ["rim", "handle"],

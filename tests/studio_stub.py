@@ -163,6 +163,7 @@ class StubStudio:
             "surface": 1,
             "fine": False,
             "cost": self._away**2,
+            "checked": False,
             "rigid_motions": 6,
             "rms_cents": float(np.sqrt(np.mean(cents**2))),
             "targets": [each["name"] for each in self._targets],

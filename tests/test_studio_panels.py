@@ -462,6 +462,9 @@ def test_a_cost_that_rises_is_explained(panels, page):
     expect(says.nth(1)).to_contain_text("35.0 cents rms from the targets, the coarse one 8.0")
     panels.tell(progress(3.0, 0.6, first, second))
     expect(says.nth(2)).to_contain_text("rises from 0.3 to 0.6: a search began there")
+    panels.tell(bank(cost=0.25, checked=True))
+    expect(line).to_contain_text("0.25 on the fine solid, 90.0 % below the first one")
+    expect(says.nth(0)).to_contain_text("the cost on the fine solid: 0.25")
 
 
 # Settings

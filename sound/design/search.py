@@ -78,9 +78,9 @@ class Search:
     ----------
     best, start
         Best trial of the present leg, and first trial of all.
-    history, checks
+    history, checks, best_checked
         Best cost over time, which may rise where a leg begins; checks on the fine solid, see
-        `sound.design.space_mapping`.
+        `sound.design.space_mapping`, and the best trial by them.
     spent
         Whether the whole budget is used up, or an interrupt came.
     """
@@ -99,6 +99,7 @@ class Search:
         self.history: list[HistoryEntry] = []
         self.spent = False
         self.checks: list[CheckEntry] = []
+        self.best_checked: Trial | None = None
         self._objective: Objective | None = None
         self._is_last = True
         self._most = self._leg_most = evaluations

@@ -140,7 +140,7 @@ class SpaceMapping:
             return search.own_seconds - begin
         search.checks.append(self._entry(search, checked))
         if self.best is None or checked.total < self.best.total:
-            self.best = checked
+            self.best, search.best_checked = checked, trial
         return search.own_seconds - begin
 
     def _entry(self, search: Search, checked: Checked) -> CheckEntry:

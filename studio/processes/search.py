@@ -114,7 +114,10 @@ class _News:
                 continue
             entry = search.history[-1]
             self._told = max(self._told, entry.seconds + since)
-            self._send(_row(entry, best, is_new, self._told) | {"checks": self.checks})
+            news = _row(entry, best, is_new, self._told) | {"checks": self.checks}
+            if search.best_checked is not None:
+                news["best_checked"] = search.best_checked.z.tolist()
+            self._send(news)
 
     @property
     def checks(self) -> list[dict[str, float]]:

@@ -15,10 +15,12 @@ const MOST_TOLD = 3;
  *
  * @param {readonly Pick<Progress, "seconds" | "cost">[]} rows
  * @param {readonly FineCheck[]} checks on the fine solid
+ * @param {number | null} present cost on the fine solid of the material that sounds
  * @returns {string[]}
  */
-export function explanations(rows, checks) {
-  const sentences = checks.length > 0 ? [ofTheCurve(rows, checks)] : [];
+export function explanations(rows, checks, present) {
+  const best = Math.min(...checks.map((check) => check.cost));
+  const sentences = checks.length > 0 ? [ofTheCurve(rows, checks, present ?? best)] : [];
   const rises = rows.flatMap((row, index) => {
     const before = rows[index - 1];
     return before && row.cost > (1 + LEAST_RISE) * before.cost ? [ofARise(before, row, checks)] : [];
@@ -29,13 +31,13 @@ export function explanations(rows, checks) {
 /**
  * @param {readonly Pick<Progress, "cost">[]} rows
  * @param {readonly FineCheck[]} checks
+ * @param {number} cost on the fine solid
  */
-function ofTheCurve(rows, checks) {
+function ofTheCurve(rows, checks, cost) {
   const last = rows[rows.length - 1]?.cost;
-  const best = Math.min(...checks.map((check) => check.cost));
   return (
     `The curve is of what the search works with, as a rule the coarse solid: ${significant(last, 4)} at last. ` +
-    `What counts is the cost on the fine solid: ${significant(best, 4)}, by ${checks.length} ` +
+    `What counts is the cost on the fine solid: ${significant(cost, 4)}, by ${checks.length} ` +
     `${checks.length === 1 ? "check" : "checks"}.`
   );
 }

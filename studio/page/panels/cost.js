@@ -36,6 +36,8 @@ export function makeCost(element, parts) {
   let rows = [];
   /** @type {FineCheck[]} */
   let checks = [];
+  /** Cost on the fine solid of the material that sounds; null if it is not known. @type {number | null} */
+  let present = null;
   /** @type {import("uplot") | null} */
   let plot = null;
   let isWaiting = false;
@@ -64,12 +66,12 @@ export function makeCost(element, parts) {
     const compared = rows.length > 1 ? `, ${change(first.cost, last.cost)}` : "";
     const effort = `${last.evaluations} ${last.evaluations === 1 ? "evaluation" : "evaluations"} in ${withSeconds(last.seconds)}`;
     const [fineFirst] = checks;
-    const fineCost = Math.min(...checks.map((check) => check.cost));
+    const fineCost = present ?? Math.min(...checks.map((check) => check.cost));
     const told = fineFirst
       ? `${significant(fineCost, 4)} on the fine solid, ${change(fineFirst.cost, fineCost)}`
       : `${significant(last.cost, 4)}${compared}`;
     setText(value, `${told}; ${effort}`);
-    keepList(says, explanations(rows, checks), (_text, index) => String(index), () => make("li"), setText);
+    keepList(says, explanations(rows, checks, present), (_text, index) => String(index), () => make("li"), setText);
     says.hidden = says.children.length === 0;
     setAttribute(
       picture,
@@ -130,6 +132,10 @@ export function makeCost(element, parts) {
     requestAnimationFrame(show);
   }
 
+  connection.onBinary("bank", (header) => {
+    present = header.checked ? header.cost : null;
+    later();
+  });
   connection.onEvent("history", (event) => {
     rows = [...event.rows];
     checks = event.checks;
