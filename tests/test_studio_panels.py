@@ -443,6 +443,12 @@ def test_the_cost_is_drawn_and_told(panels, page):
     expect(page.locator("#panel-cost .plot")).to_be_hidden()
 
 
+def test_a_cost_of_any_size_is_drawn(panels):
+    """An axis that begins at 0.0095, a little below a power of ten, is one."""
+    panels.tell(progress(0.5, 9.18) | {"amplitude_cost": 0.01427, "regulariser": 0.5})
+    assert ink(panels, "#panel-cost")["all"] > 0
+
+
 def test_a_cost_that_rises_is_explained(panels, page):
     first, second = (
         {"seconds": at, "cost": cost, "coarse_rms_cents": 8.0, "fine_rms_cents": 35.0}

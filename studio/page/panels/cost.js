@@ -4,7 +4,7 @@ import { keepList, make, setAttribute, setText } from "./dom.js";
 import { explanations } from "./cost-words.js";
 import { makeLegend } from "./legend.js";
 import { change, significant, withSeconds } from "./numbers.js";
-import { axis, colour, makePlot } from "./plots.js";
+import { axis, colour, makePlot, roundNumbers } from "./plots.js";
 
 /** @typedef {import("../types.js").Progress} Progress */
 /** @typedef {import("../types.js").FineCheck} FineCheck */
@@ -97,6 +97,8 @@ export function makeCost(element, parts) {
           axis("Processor time [s]", { size: 34 }),
           axis("Cost", {
             size: 54,
+            // Those of the library have no end where the lowest is between two powers of ten.
+            splits: (_one, _axis, low, high) => roundNumbers(low, high),
             values: (_one, splits) => splits.map((split) => (split === null ? "" : significant(split, 1))),
           }),
         ],
