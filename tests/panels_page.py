@@ -97,7 +97,12 @@ def state(**changes: Any) -> dict[str, Any]:
 
 
 def bank(
-    hertz: np.ndarray = NOW, number: int = 1, wanted: bool = True, rigid_motions: int = 6
+    hertz: np.ndarray = NOW,
+    number: int = 1,
+    wanted: bool = True,
+    rigid_motions: int = 6,
+    cost: float = 0.4,
+    checked: bool = False,
 ) -> bytes:
     """The bank of a triangle whose modes are a little off."""
     told = {
@@ -111,7 +116,8 @@ def bank(
         "number": number,
         "surface": 3,
         "fine": False,
-        "cost": 0.4,
+        "cost": cost,
+        "checked": checked,
         "rigid_motions": rigid_motions,
         "rms_cents": float(np.sqrt(np.mean((1200 * np.log2(hertz / WANTED)) ** 2))),
         "targets": ["rim", "handle"],
@@ -127,8 +133,9 @@ def bank(
     return pack(header, arrays)
 
 
-def progress(seconds: float, cost: float) -> dict[str, Any]:
+def progress(seconds: float, cost: float, *checks: dict[str, float]) -> dict[str, Any]:
     return {
+        "checks": list(checks),
         "event": "progress",
         "seconds": seconds,
         "evaluations": int(10 * seconds) + 1,
@@ -200,7 +207,7 @@ class Panels:
         self._socket = socket
         socket.on_message(self._reply)
         self.tell(self.state)
-        self.tell({"event": "history", "rows": []})
+        self.tell({"event": "history", "rows": [], "checks": []})
         if self.state["solid"]:
             self.tell(bank())
 

@@ -46,7 +46,8 @@ def clip_entry(
         "message": None,
         "seconds": 1.2,
         "rate_hz": 44100,
-        "explained_decibels": 13.6,
+        "progress": None,
+        "explained": 0.9563,
         "says": ["its first 12 ms are left out"],
         "modes": modes,
     }
@@ -162,6 +163,7 @@ class StubStudio:
             "surface": 1,
             "fine": False,
             "cost": self._away**2,
+            "checked": False,
             "rigid_motions": 6,
             "rms_cents": float(np.sqrt(np.mean(cents**2))),
             "targets": [each["name"] for each in self._targets],
@@ -181,7 +183,7 @@ class StubStudio:
     def subscribe(self) -> Feed:
         feed = Feed()
         feed.send(self.state(), newest="state")
-        feed.send({"event": "history", "rows": self._history}, newest="history")
+        feed.send({"event": "history", "rows": self._history, "checks": []}, newest="history")
         feed.put(self.bank(), newest="bank")
         self.feeds.add(feed)
         return feed
@@ -250,7 +252,7 @@ class StubStudio:
             }
             self._history.append(row)
             for feed in self.feeds:
-                feed.send({"event": "progress", **row}, newest="progress")
+                feed.send({"event": "progress", **row, "checks": []}, newest="progress")
             self.changed()
         self._search, self._phase = None, "idle"
         self.changed()

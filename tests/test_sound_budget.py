@@ -1,6 +1,8 @@
 """The budget of a search: as many modal analyses as were asked for, and never for the worse."""
 
+import time
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
 from sound.design.pool import Pool
 from sound.design.preparation import prepare
+from sound.design.simulation import Simulation
 from sound.design.tasks import Task
 from studies.design.measure import _medians, compare_optimisers
 from tests import small_project
@@ -146,3 +149,29 @@ def test_what_some_searches_did_not_come_to_is_larger_than_all():
     assert (row["cost_end"], row["cost_end_min"], row["cost_end_max"]) == (2.0, 1.0, 3.0)
     assert (row["seconds_to_90_percent"], row["seconds_to_90_percent_max"]) == (5.0, None)
     assert row["curve"] == [[0.0, 2.0]]
+
+
+@pytest.mark.parametrize("fine_check", [False, True])
+def test_the_time_of_a_search_is_processor_time(problem, monkeypatch, fine_check):
+    """By a clock of the processor that an analysis moves on by a second, those of checks too."""
+    made = []
+    evaluate = Simulation.evaluate
+    monkeypatch.setattr(Simulation, "evaluate", lambda *all: made.append(1) or evaluate(*all))
+    monkeypatch.setattr(time, "thread_time", lambda: float(len(made)))
+    monkeypatch.setattr(time, "monotonic", lambda: 1e9 * next(ticks))
+    ticks = count()
+    options = {"seconds": 20.0, "evaluations": None, "workers": 1, "fine_check": fine_check}
+    design = optimise(with_options(problem, **options))
+    assert 15 <= len(made) <= 25
+    assert 15.0 <= design.history["seconds"][-1] <= design.evidence["seconds"]
+
+
+def test_processes_side_by_side_take_the_time_of_the_slowest(problem):
+    processes = Pool(problem.setting, 2)
+    z = np.zeros(problem.setting.material.dimensions)
+    before = processes.seconds
+    trials = processes.run([Task(z)] * 3)
+    slowest = max(trial.seconds for trial in trials)
+    assert all(trial.seconds > 0.0 for trial in trials)
+    assert slowest <= processes.seconds - before < slowest + 1.0
+    processes.close()

@@ -362,14 +362,18 @@ def test_files_are_dropped(page, studio):
     call = until(lambda: next((c for c in studio.calls if c[0] == "add_target"), None))
     assert call[1] == {"vertex": vertex, "clip": "c2"}
     page.evaluate(DROP, [1200, 780, "dong.wav", "RIFF", "audio/wav"])
+    # The new target is the selected one.
+    page.get_by_role("button", name="Replace by dong.wav").click()
     call = until(lambda: next((c for c in studio.calls if c[0] == "change_target"), None))
-    assert call[1] == {"target": "rim", "clip": "c3"}
+    assert call[1] == {"target": "target 2", "clip": "c3"}
+    page.evaluate(DROP, [x, y, "dang.wav", "RIFF", "audio/wav"])
+    page.get_by_role("button", name="Keep dong.wav").click()
     page.evaluate(DROP, [x, y, "cup.stl", "solid", ""])
     dialog = page.get_by_role("dialog", name="Open cup.stl")
     dialog.get_by_label("One unit of the file").select_option(label="mm")
     dialog.get_by_role("button", name="Open").click()
     call = until(lambda: next((c for c in studio.calls if c[0] == "open_mesh"), None))
-    assert call[1] == {"mesh": "m3", "unit": 0.001}
+    assert call[1] == {"mesh": "m4", "unit": 0.001}
     page.evaluate(DROP, [x, y, "ding.wav", "none", "audio/wav"])
     until(lambda: "expected WAV" in page.locator("#messages").inner_text())
     page.evaluate(DROP, [x, y, "letter.pdf", "none", ""])

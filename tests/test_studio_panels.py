@@ -9,10 +9,12 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
+from carillon.composition.materials import named_material
 from carillon.parameters.schema import schema_of
 from sound.design.pitch import bark as bark_of
 from sound.design.pitch import cents as cents_of
 from sound.project.project import Project
+from studio.server.uploads import CLIP_ENDINGS
 from tests.panels_page import NOW, WANTED, bank, progress, ready_clip, state, target, window
 from tests.patience import PATIENCE_SECONDS
 from tests.studio_pages import TWO_FRAMES, axe_finds
@@ -149,6 +151,7 @@ def test_of_a_clip_that_is_being_listened_to_only_the_clip_is_heard(panels, page
 def test_a_clip_is_chosen_taken_from_a_file_and_recorded(panels, page):
     page.select_option("#target-clip", "")
     assert last_call(panels) == ("change_target", {"target": "rim", "clip": None})
+    panels.change(targets=[target("rim", 1, None)])
     sound = {"name": "a b.wav", "mimeType": "audio/wav", "buffer": b"RIFF"}
     page.set_input_files("#target-file", sound)
     assert last_call(panels, 2) == ("change_target", {"target": "rim", "clip": "c10"})
@@ -173,7 +176,65 @@ def test_a_recording_is_discarded_or_ends_by_itself(panels, page):
     page.click("#record-clip")
     expect(page.locator(".recording")).to_be_visible()
     page.evaluate("studio.recorder.fill()")
+    page.get_by_role("button", name="Replace by recording-1.wav").click()
     assert last_call(panels) == ("change_target", {"target": "rim", "clip": "c10"})
+
+
+def test_a_clip_replaces_another_one_only_after_a_question(panels, page):
+    sound = {"name": "cup.flac", "mimeType": "audio/flac", "buffer": b"fLaC"}
+    page.set_input_files("#target-file", sound)
+    question = page.get_by_role("dialog")
+    expect(question).to_have_accessible_name("rim has the clip plate.wav. Replace it by cup.flac?")
+    question.get_by_role("button", name="Keep plate.wav").click()
+    expect(question).to_have_count(0)
+    assert panels.calls == [] and panels.uploads == ["cup.flac"]
+    panels.change(clips=[ready_clip(), ready_clip() | {"clip": "c10", "name": "cup.flac"}])
+    page.select_option("#target-clip", "c10")
+    page.keyboard.press("Escape")
+    expect(question).to_have_count(0)
+    expect(page.locator("#target-clip")).to_have_value("c1")
+    page.select_option("#target-clip", "c10")
+    question.get_by_role("button", name="Replace by cup.flac").click()
+    assert last_call(panels) == ("change_target", {"target": "rim", "clip": "c10"})
+
+
+def test_a_new_target_is_the_selected_one(panels, page):
+    targets = panels.state["targets"]
+    panels.change(targets=[*targets, target("bow", 0, None)])
+    expect(page.locator("#target-name")).to_have_value("bow")
+    panels.change(targets=targets)
+    expect(page.locator("#target-name")).to_have_value("rim")
+
+
+def test_every_clip_that_the_server_takes_can_be_picked(page):
+    assert page.get_attribute("#target-file", "accept") == ",".join(CLIP_ENDINGS)
+    taken = page.evaluate(
+        """async (endings) => {
+          const { kindOf } = await import("/page/solid/files.js");
+          return endings.map((ending) => kindOf(new File([], `A.${ending.toUpperCase()}`)));
+        }""",
+        CLIP_ENDINGS,
+    )
+    assert taken == ["clip"] * len(CLIP_ENDINGS)
+
+
+def test_an_extraction_tells_how_far_it_is_and_can_be_stopped(panels, page):
+    clip = ready_clip() | {"modes": [], "phase": "listening"}
+    doing = {"message": "bands of 98 Hz", "progress": 0.4}
+    panels.open(state(clips=[clip | doing], wanted=None))
+    details = page.locator(".target-details")
+    expect(details).to_contain_text("Its modes are being found: bands of 98 Hz")
+    expect(page.locator("#panel-targets .target-list")).to_contain_text("finding modes, 40 %")
+    assert details.locator("progress").evaluate("each => each.value") == pytest.approx(0.4)
+    panels.change(clips=[clip | {"message": "fitting what was found"}])
+    expect(details.locator("progress:indeterminate")).to_be_visible()
+    page.get_by_role("button", name="Stop finding modes").click()
+    assert last_call(panels) == ("stop_extraction", {"clip": "c1"})
+    panels.change(clips=[clip | {"phase": "stopped", "message": "it was stopped"}])
+    expect(details.locator("progress")).to_be_hidden()
+    expect(page.locator("#search-state")).to_contain_text("plate.wav cannot be used")
+    page.get_by_role("button", name="Find its modes").click()
+    assert last_call(panels, 2) == ("extract_again", {"clip": "c1"})
 
 
 def test_modes_taken_are_a_number_or_all(panels, page):
@@ -197,7 +258,7 @@ def test_a_clip_may_be_said_to_be_clipped(panels):
 
 def test_modes_of_a_clip_are_told(page):
     expect(page.locator("#panel-clip .figure-line")).to_have_text(
-        "plate.wav: 4 of 4 modes used; all explain 13.6 dB"
+        "plate.wav: 4 of 4 modes used; all explain 95.63 % of the energy"
     )
     expect(page.locator("#panel-clip .says")).to_have_text("its first 12 ms are left out")
     page.get_by_text("Modes of the clip").first.click()
@@ -378,8 +439,38 @@ def test_the_cost_is_drawn_and_told(panels, page):
     panels.tell(progress(1.5, 0.1))
     expect(line).to_contain_text("0.1, 95.0 % below")
     assert ink(panels, "#panel-cost")["sum"] != before["sum"]
-    panels.tell({"event": "history", "rows": []})
+    panels.tell({"event": "history", "rows": [], "checks": []})
     expect(page.locator("#panel-cost .plot")).to_be_hidden()
+
+
+def test_a_cost_of_any_size_is_drawn(panels):
+    """An axis that begins at 0.0095, a little below a power of ten, is one."""
+    panels.tell(progress(0.5, 9.18) | {"amplitude_cost": 0.01427, "regulariser": 0.5})
+    assert ink(panels, "#panel-cost")["all"] > 0
+
+
+def test_a_cost_that_rises_is_explained(panels, page):
+    first, second = (
+        {"seconds": at, "cost": cost, "coarse_rms_cents": 8.0, "fine_rms_cents": 35.0}
+        for at, cost in ((0.1, 2.5), (1.2, 0.4))
+    )
+    panels.tell(progress(0.5, 2.0, first))
+    panels.tell(progress(1.0, 0.1, first))
+    says = page.locator("#panel-cost .says li")
+    expect(says).to_have_count(1)
+    panels.tell(progress(1.5, 0.3, first, second))
+    line = page.locator("#panel-cost .figure-line")
+    expect(line).to_have_text(
+        "0.4 on the fine solid, 84.0 % below the first one; 16 evaluations in 1.5 s"
+    )
+    expect(says.nth(0)).to_contain_text("the cost on the fine solid: 0.4, by 2 checks")
+    expect(says.nth(1)).to_contain_text("At 1.5 s the cost rises from 0.1 to 0.3: a check found")
+    expect(says.nth(1)).to_contain_text("35.0 cents rms from the targets, the coarse one 8.0")
+    panels.tell(progress(3.0, 0.6, first, second))
+    expect(says.nth(2)).to_contain_text("rises from 0.3 to 0.6: a search began there")
+    panels.tell(bank(cost=0.25, checked=True))
+    expect(line).to_contain_text("0.25 on the fine solid, 90.0 % below the first one")
+    expect(says.nth(0)).to_contain_text("the cost on the fine solid: 0.25")
 
 
 # Settings
@@ -390,8 +481,8 @@ def test_only_what_was_changed_is_sent(panels, page):
     page.get_by_label("Weight of amplitudes").fill("2.5e1")
     page.get_by_label("Density [kg/m³]", exact=True).fill("1000")
     page.get_by_text("More settings").click()
-    page.get_by_label("Bounds of the modulus, lowest").fill("1e7")
-    page.get_by_label("Bounds of the modulus, highest").fill("4e11")
+    page.get_by_label("Bounds of the modulus, lowest").fill("0.01")
+    page.get_by_label("Bounds of the modulus, highest").fill("400")
     page.get_by_label("Check on the fine solid").uncheck()
     page.get_by_role("button", name="Apply").click()
     assert last_call(panels) == (
@@ -405,6 +496,27 @@ def test_only_what_was_changed_is_sent(panels, page):
             }
         },
     )
+
+
+def test_a_material_by_name_fills_in_its_constants(panels, page):
+    preset = page.get_by_label("Material at the start")
+    expect(preset).to_have_value("")
+    preset.select_option("steel")
+    expect(page.get_by_label("Young's modulus at the start [GPa]")).to_have_value("200")
+    page.get_by_role("button", name="Apply").click()
+    steel = named_material("steel")
+    sent = {"density": steel.density, "poisson": steel.poisson}
+    sent["material"] = {"young": steel.young}
+    assert last_call(panels) == ("change_settings", {"settings": sent})
+    now = panels.state["settings"]
+    panels.change(settings=now | sent | {"material": now["material"] | sent["material"]})
+    expect(preset).to_have_value("steel")
+    page.get_by_label("Density [kg/m³]", exact=True).fill("7000")
+    page.get_by_role("button", name="Apply").click()
+    panels.change(settings=panels.state["settings"] | {"density": 7000.0})
+    expect(preset).to_have_value("")
+    panels.change(regions=[{"name": "body", "material": "iron", "dabs": None, "fault": None}])
+    expect(preset).to_be_hidden()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from carillon.composition.materials import named_material
 from studio.binary import pack
 from studio.processes.composition import NONE
 from tests.panels_page import bank, state, window
@@ -67,8 +68,9 @@ def test_the_table_tells_what_regions_are_made_of(page):
 
 
 def test_a_region_is_added_and_painted(panels, page):
+    regions_of(page).get_by_label("made of").select_option("glass")
     regions_of(page).get_by_role("button", name="Add a region").click()
-    row = {"name": "region 3", "painted": []}
+    row = {"name": "region 3", "material": "glass", "painted": []}
     assert last_call(panels) == ("add_row", {"kind": "regions", "row": row})
     added = {"name": "region 3", "dabs": 0, "fault": None}
     panels.change(regions=[BODY, HANDLE, added])
@@ -79,7 +81,20 @@ def test_a_region_is_added_and_painted(panels, page):
 def test_the_first_region_is_all_of_the_solid(panels, page):
     panels.change(regions=[], supports=[])
     regions_of(page).get_by_role("button", name="Add a region").click()
-    assert last_call(panels) == ("add_row", {"kind": "regions", "row": {"name": "body"}})
+    row = {"name": "body", "material": "steel"}
+    assert last_call(panels) == ("add_row", {"kind": "regions", "row": row})
+
+
+def test_a_region_keeps_the_constants_of_a_material_that_it_does_not_name_any_more(panels, page):
+    chosen(page, "body")
+    regions_of(page).get_by_label("Material").select_option("")
+    iron = named_material("iron")
+    changes = last_call(panels)[1]["changes"]
+    assert changes["material"] is None
+    assert (changes["young"], changes["density"]) == (iron.young, iron.density)
+    regions_of(page).get_by_label("Material").select_option("glass")
+    own = dict.fromkeys(("young", "poisson", "density", "loss_factor"))
+    assert last_call(panels, 2)[1]["changes"] == own | {"material": "glass"}
 
 
 def chosen(page, name):

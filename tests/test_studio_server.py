@@ -147,7 +147,7 @@ def test_a_page_is_told_the_state_the_history_and_the_bank_first(server):
     with server.talk() as page:
         state, history, bank = (page.recv(timeout=SECONDS) for _ in range(3))
     assert json.loads(state)["event"] == "state"
-    assert json.loads(history) == {"event": "history", "rows": []}
+    assert json.loads(history) == {"event": "history", "rows": [], "checks": []}
     header, arrays = unpack(bank)
     n_modes, n_vertices = len(arrays["hertz"]), server.studio.state()["solid"]["vertices"]
     assert header["event"] == "bank" and header["surface"] == 1

@@ -23,6 +23,7 @@ from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from studio.binary import unpack
 from studio.session import open_studio
+from studio.session.document import Material
 from studio.session.workspace import OWN_FOLDER
 from tests import small_project
 from tests.patience import HANG_SECONDS, wait_for
@@ -206,6 +207,21 @@ async def test_an_edit_while_a_search_goes_on_is_taken_up_and_can_be_undone(fold
         await until(lambda: aimed(page, ["end"]), page)
         assert studio.session.document.material.design is not None
         assert not page.said
+
+
+async def test_a_stopped_search_keeps_what_was_checked_if_that_is_better(folder):
+    """As the last material was found on the coarse solid alone."""
+    worse, better = Material((3.0, *[0.0] * 9)), [0.0] * 10
+    async with opened_bar(folder) as (studio, page):
+        session = studio.session
+        for found, kept in ((None, worse.z), (worse, better)):
+            session.history.replace(replace(session.document, material=worse))
+            session.search.found, session.search.best_checked = found, better
+            await studio.call("save", {"name": "kept"})
+            design = read_design(folder / "kept.h5")
+            assert design.coordinates.tolist() == list(kept)
+            assert session.document.material.z == tuple(kept)
+        assert page.state["saved"]
 
 
 async def test_targets_are_placed_moved_named_and_given_clips(folder):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from datetime import timedelta
 from typing import TypeVar
 
@@ -15,6 +16,27 @@ T = TypeVar("T")
 
 LINE_SECONDS = 60.0
 """Time between two lines in a log file; what is over sooner stays silent."""
+Watch = Callable[[str, int, int | None], None]
+"""Receives the label of what is iterated over, units that are done, and units in all."""
+_watch: ContextVar[Watch | None] = ContextVar("watch", default=None)
+
+
+@contextmanager
+def watched(watch: Watch | None) -> Iterator[None]:
+    """Call `watch` after each item of every `track` in the context, whether visible or not.
+
+    Examples
+    --------
+    >>> with watched(lambda label, done, total: print(label, done, "of", total)):
+    ...     kept = [name for name in track(["rim", "bow"], "bells", visible=False)]
+    bells 1 of 2
+    bells 2 of 2
+    """
+    token = _watch.set(watch)
+    try:
+        yield
+    finally:
+        _watch.reset(token)
 
 
 def track(
@@ -39,6 +61,9 @@ def track(
     """
     if total is None and isinstance(items, Sized):
         total = len(items)
+    watch = _watch.get()
+    if watch is not None:
+        items = _told(items, watch, label, total, weight, done)
     if not visible:
         yield from items
         return
@@ -51,6 +76,20 @@ def track(
         for item in items:
             yield item
             shown.update(1 if weight is None else weight(item))
+
+
+def _told(
+    items: Iterable[T],
+    watch: Watch,
+    label: str,
+    total: int | None,
+    weight: Callable[[T], int] | None,
+    done: int,
+) -> Iterator[T]:
+    for item in items:
+        yield item
+        done += 1 if weight is None else weight(item)
+        watch(label, done, total)
 
 
 class _LineProgress:

@@ -9,13 +9,14 @@ signal is 20 dB above the noise, by two thirds of it at 40 dB.  Errors of resolv
 that the noise makes inevitable.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.command_line.progress import Watch, watched
 from carillon.errors import UserError
 from carillon.processes.threads import blas_threads
 from sound.bounds import require_level
@@ -29,6 +30,10 @@ from sound.synthesis.sinusoids import damped_sinusoids, superposed
 
 LONGEST_SECONDS = 6.0
 """Length of the part after the strike that is searched for modes [s]."""
+Progress = Callable[[str, float | None], None]
+"""Receives what `extract` does and which share of that is done; None if that is not known."""
+FITTING = "fitting what was found"
+"""What `extract` does after each search of bands."""
 MOSTLY_MODES = 0.8
 """Least share of a clip's energy in its modes without a remark."""
 
@@ -68,7 +73,11 @@ class ModalSound:
 
 
 def extract(
-    samples: Array, rate: int, modes: int | None = None, visible: bool = False
+    samples: Array,
+    rate: int,
+    modes: int | None = None,
+    visible: bool = False,
+    progress: Progress | None = None,
 ) -> ModalSound:
     """Modes of the contact sound that a clip holds; of several strikes, of the first.
 
@@ -82,6 +91,8 @@ def extract(
         Number of modes to keep, those with most energy; all that are found if None.
     visible : bool
         Whether progress is shown.
+    progress
+        Called with what is done, such as "bands of 98 Hz", and with the share of it that is done.
 
     Raises
     ------
@@ -115,7 +126,7 @@ def extract(
     scale = float(np.abs(clip).max())
     searched = clip[: round(LONGEST_SECONDS * rate)] / scale
     clipped = is_clipped(clip)[: len(searched)]
-    with blas_threads(1):  # many small matrices
+    with blas_threads(1), watched(_watch(progress)):  # many small matrices
         if clipped.any():
             free, searched = restored(searched, clipped, rate, visible)
             clip[: len(searched)] = searched * scale
@@ -134,6 +145,19 @@ def extract(
         glide=None if bend is None else asdict(bend),
     )
     return sound
+
+
+def _watch(progress: Progress | None) -> Watch | None:
+    if progress is None:
+        return None
+
+    def tell(label: str, done: int, total: int | None) -> None:
+        if total is None or done >= total:
+            progress(FITTING, None)
+        else:
+            progress(label, done / total)
+
+    return tell
 
 
 def _require_sound(clip: Array) -> None:

@@ -14,7 +14,7 @@ from carillon.files.cache import remembered
 from carillon.files.datasets import number, read, refused
 from carillon.files.hdf5 import create_h5, open_h5
 from carillon.records import provenance
-from sound.clips.extraction import ModalSound, extract
+from sound.clips.extraction import ModalSound, Progress, extract
 from sound.clips.wav import read_wav
 
 _KIND, _SCHEMA = "clip", 1
@@ -23,7 +23,11 @@ _ARRAYS = (*_MODES, "residual")
 
 
 def extract_file(
-    path: str | Path, modes: int | None = None, visible: bool = False, allow_clipped: bool = False
+    path: str | Path,
+    modes: int | None = None,
+    visible: bool = False,
+    allow_clipped: bool = False,
+    progress: Progress | None = None,
 ) -> ModalSound:
     """Modes of the clip in a WAV file, see `extract`, whose errors then name the file.
 
@@ -34,7 +38,7 @@ def extract_file(
     try:
         key = _key(samples, rate, modes)
         return remembered(
-            "clips", key, lambda: extract(samples, rate, modes, visible), _read, _write
+            "clips", key, lambda: extract(samples, rate, modes, visible, progress), _read, _write
         )
     except UserError as error:
         raise UserError(f"{path}: {error}") from None

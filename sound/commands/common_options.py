@@ -9,7 +9,7 @@ from sound.project.settings import Dampings, OptimiserMethod
 class SearchOptions:
     """What takes the place of settings of a project's optimiser; None leaves one as it is."""
 
-    seconds: Positive | None = option(None, "wall time of a search, not the project's")
+    seconds: Positive | None = option(None, "processor time of a search, not the project's")
     evaluations: Count | None = option(
         None, "modal analyses of a search at most, not the project's"
     )

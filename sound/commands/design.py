@@ -149,7 +149,7 @@ class _SearchProgress:
         text = (
             f"{search.own_seconds:6.1f} s  {search.own_evaluations:5,} evaluations  "
             f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
-            f"E_f {cost.frequency:8.3g}  E_a {cost.amplitude:8.3g}"
+            f"frequencies {cost.frequency:8.3g}  amplitudes {cost.amplitude:8.3g}"
         )
         if search.checks:
             best = min(search.checks, key=lambda check: check.cost)
@@ -161,11 +161,11 @@ class _SearchProgress:
 
 def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
-    from sound.design.pitch import rms_off_partials
+    from sound.design.pitch import cents, rms_off_partials
 
     evidence, targets = design.evidence, design.targets
     which = targets.sounding
-    off = np.abs(design.frequencies / targets.frequencies - 1.0)[which]
+    off = np.abs(cents(design.frequencies, targets.frequencies))[which]
     assert design.damping is not None
     ratios = (design.damping.dampings / targets.dampings)[which]
     loss = design.damping.loss_factors
@@ -177,8 +177,8 @@ def summarise(design: Design) -> dict[str, Any]:
         "partials": len(which),
         "targets": [strike.name for strike in design.strikes],
         "target_distances_m": [strike.distance for strike in design.strikes],
-        "frequency_error_median": float(np.median(off)),
-        "frequency_error_max": float(off.max()),
+        "frequency_error_median_cents": float(np.median(off)),
+        "frequency_error_max_cents": float(off.max()),
         "coarse_rms_cents": rms_off_partials(design.coarse_frequencies, targets),
         "fine_rms_cents": None
         if design.fine is None
@@ -226,8 +226,8 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"less) in {summary['seconds']:.1f} s and {summary['evaluations']:,} evaluations "
             f"({summary['evaluations_per_minute']:,.0f} a minute, {summary['workers']} workers)",
             f"frequencies of {summary['partials']} partials among {summary['modes']} modes: "
-            f"median error {summary['frequency_error_median']:.2%}, worst "
-            f"{summary['frequency_error_max']:.2%}; "
+            f"median error {summary['frequency_error_median_cents']:.1f} cents, worst "
+            f"{summary['frequency_error_max_cents']:.1f} cents; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
             _rms_sentence(summary),
             *_material_sentences(design, summary),

@@ -96,11 +96,13 @@ def _line(clip: dict[str, Any]) -> str:
 
 
 def _lines(content: dict[str, Any]) -> list[str]:
-    from math import log10
+    from math import log, log10
 
     lines = [_line(clip) for clip in content["clips"]]
     names = content["names"]
-    lines.append("  ".join(["    Hz", "      1/s", *(f"{name:>22}" for name in names)]))
+    lines.append(
+        "  ".join(["    Hz", "      1/s", "60 dB in s", *(f"{name:>22}" for name in names)])
+    )
     loudest = [max(row) for row in content["amplitudes"]]
     columns = zip(*content["amplitudes"], strict=True)
     modes = zip(content["frequencies_hz"], content["dampings_per_second"], columns, strict=True)
@@ -109,5 +111,6 @@ def _lines(content: dict[str, Any]) -> list[str]:
             f"{value:12.3e} {20.0 * log10(value / top):6.1f} dB" if value > 0.0 else " " * 22
             for value, top in zip(column, loudest, strict=True)
         ]
-        lines.append("  ".join([f"{hertz:9.2f}", f"{damping:8.3f}", *parts]))
+        fall = log(1000.0) / damping
+        lines.append("  ".join([f"{hertz:9.2f}", f"{damping:8.3f}", f"{fall:10.3f}", *parts]))
     return lines

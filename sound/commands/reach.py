@@ -29,7 +29,7 @@ class ReachOptions:
 
     project: str = option(REQUIRED, "project file (YAML)")
     design: str = option(REQUIRED, "its design.h5")
-    seconds: Positive = option(120.0, "wall time in which descents begin")
+    seconds: Positive = option(120.0, "processor time in which descents begin")
     descents: Annotated[int, between(1, 1000)] = option(3, "descents for each question at most")
     workers: Workers | None = option(None, "processes, not the project's")
     unless_fall: Annotated[float, between(0.0, 1.0)] | None = option(

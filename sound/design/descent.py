@@ -19,20 +19,26 @@ from sound.design.simulation import Evaluation, Simulation
 class DescentLimits:
     """Limits of a descent, and the receiver of its steps.
 
-    No evaluation begins after `deadline` [s], by the monotonic clock, nor after so many
-    `evaluations`; that of the start is always made.  `tell` is called with every material that
-    lowers the cost.
+    No evaluation begins after so many `seconds` of processor time, which count from `begin` [s] of
+    this thread on, nor after so many `evaluations`; that of the start is always made.  `tell` is
+    called with every material that lowers the cost.
     """
 
-    deadline: float = np.inf
+    seconds: float = np.inf
     evaluations: float = np.inf
     tell: Callable[[Evaluation, DesignCost], None] | None = None
+    begin: float = 0.0
+
+    @property
+    def spent(self) -> float:
+        """Processor time [s] of this thread since `begin`."""
+        return time.thread_time() - self.begin
 
 
 class CostPoint(NamedTuple):
-    """A cost in a descent, with its time (monotonic clock [s]) and number of evaluations."""
+    """A cost in a descent, with its processor time [s] and number of evaluations."""
 
-    clock: float
+    seconds: float
     evaluations: int
     cost: DesignCost
 
@@ -87,7 +93,7 @@ class Descent:
         Raises ConvergenceError if it has no modes.
         """
         evaluation = self.simulation.evaluate(z, start, derivatives)
-        costs = [CostPoint(time.monotonic(), 1, self.cost_of(evaluation))]
+        costs = [CostPoint(self.limits.spent, 1, self.cost_of(evaluation))]
         self.record = DesignDescent(evaluation, costs, 1, damping)
 
     @property
@@ -100,7 +106,7 @@ class Descent:
     def is_over(self) -> bool:
         """Whether a limit is reached."""
         limits = self.limits
-        return self.record.evaluations >= limits.evaluations or time.monotonic() >= limits.deadline
+        return self.record.evaluations >= limits.evaluations or limits.spent >= limits.seconds
 
     def cost_of(self, evaluation: Evaluation) -> DesignCost:
         """Cost of a material."""
@@ -124,7 +130,7 @@ class Descent:
     def come_to(self, evaluation: Evaluation, cost: DesignCost) -> None:
         """Take a material that lowers the cost as the last one."""
         self.record.last = evaluation
-        self.record.costs.append(CostPoint(time.monotonic(), self.record.evaluations, cost))
+        self.record.costs.append(CostPoint(self.limits.spent, self.record.evaluations, cost))
         if self.limits.tell is not None:
             self.limits.tell(evaluation, cost)
 

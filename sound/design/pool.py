@@ -6,6 +6,7 @@ nothing that another task has done.  So results do not depend on how many proces
 
 import os
 import pickle
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -38,7 +39,8 @@ class Pool:
     """Processes that evaluate materials; this one alone if `workers` is 1.
 
     `tell` is called with every step of a descent, from another thread if there are several
-    processes.
+    processes.  Time is that of processors, so that other work on the machine does not change what
+    is found in a given time.
     """
 
     def __init__(
@@ -46,9 +48,11 @@ class Pool:
     ) -> None:
         self._pool: children.ProcessPool | None = None
         self._held = ExitStack()
+        self._rounds, self._apart = 0, 0.0
         if workers == 1:
             self._held.enter_context(one_thread())
             _prepare(setting, tell)
+            self._begin = time.thread_time()
             return
         steps = None
         if tell is not None:
@@ -61,6 +65,14 @@ class Pool:
         file.flush()
         path = f"/proc/{os.getpid()}/fd/{file.fileno()}"
         self._pool = children.ProcessPool(workers, _prepare_apart, path, steps)
+        self._begin = time.thread_time()
+
+    @property
+    def seconds(self) -> float:
+        """Processor time [s] since the processes were started: of the thread that runs the tasks,
+        and, in each round, of the process that took longest.
+        """
+        return time.thread_time() - self._begin + self._apart
 
     def run(
         self, tasks: Sequence[Task], interrupted: Callable[[], bool] | None = None
@@ -70,20 +82,23 @@ class Pool:
         Raises InterruptedRoundError if `interrupted`, which is asked now and then where there are
         several processes, says so before all is done, and UserError if a process died.
         """
+        self._rounds += 1
         if self._pool is None:
-            return [_run(task) for task in tasks]
+            return [_run(task, self._rounds) for task in tasks]
         try:
-            futures = [self._pool.submit(_run, task) for task in tasks]
+            futures = [self._pool.submit(_run, task, self._rounds) for task in tasks]
             while wait(futures, LISTEN_SECONDS, FIRST_EXCEPTION).not_done:
                 if interrupted is not None and interrupted():
                     self.close()
                     raise InterruptedRoundError
-            return [future.result() for future in futures]
+            trials = [future.result() for future in futures]
         except BrokenProcessPool:
             raise UserError(
                 "a process that evaluates materials died, perhaps for lack of memory; run the same "
                 "command again, with fewer workers"
             ) from None
+        self._apart += max(trial.seconds for trial in trials)
+        return trials
 
     def close(self) -> None:
         """End the processes, whatever they are doing."""
@@ -95,6 +110,8 @@ class Pool:
 _setting: Setting
 _simulation: Simulation
 _tell: Callable[[SearchStep], None] | None
+_round: tuple[int, float]
+"""Number of the round of tasks, and the processor time [s] of this thread when it began here."""
 _for_good = ExitStack()
 
 
@@ -111,8 +128,9 @@ def _prepare_apart(path: str, steps: SimpleQueue[SearchStep] | None) -> None:
 
 
 def _prepare(setting: Setting, tell: Callable[[SearchStep], None] | None) -> None:
-    global _setting, _simulation, _tell
+    global _setting, _simulation, _tell, _round
     _setting, _simulation, _tell = setting, setting.simulation(), tell
+    _round = (0, 0.0)
     _fine_simulation.cache_clear()
 
 
@@ -121,8 +139,14 @@ def _fine_simulation() -> Simulation:
     return _setting.fine().simulation()
 
 
-def _run(task: Task) -> Trial:
-    """Do a task; from nothing if its start leads nowhere and an evaluation is left for that."""
+def _run(task: Task, number: int) -> Trial:
+    """Do a task of a round; from nothing if its start leads nowhere and an evaluation is left for
+    that.
+    """
+    global _round
+    if number != _round[0]:
+        _round = (number, time.thread_time())
+    task = replace(task, limits=replace(task.limits, begin=_round[1]))
     simulation = _fine_simulation() if task.fine else _simulation
     before, most = simulation.evaluations, task.limits.evaluations
     trial = Trial(task.z, FAILED, 0)
@@ -136,7 +160,8 @@ def _run(task: Task) -> Trial:
             break
         except ConvergenceError:
             continue
-    return replace(trial, evaluations=simulation.evaluations - before)
+    made = simulation.evaluations - before
+    return replace(trial, evaluations=made, seconds=task.limits.spent)
 
 
 def _telling(fine: bool) -> Callable[[Evaluation, DesignCost], None] | None:
@@ -145,7 +170,8 @@ def _telling(fine: bool) -> Callable[[Evaluation, DesignCost], None] | None:
         return None
 
     def pass_on(evaluation: Evaluation, cost: DesignCost) -> None:
-        tell(SearchStep(evaluation.z, cost, evaluation.eigenvalues, fine))
+        seconds = time.thread_time() - _round[1]
+        tell(SearchStep(evaluation.z, cost, evaluation.eigenvalues, fine, seconds))
 
     return pass_on
 

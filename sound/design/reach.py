@@ -9,9 +9,8 @@ need descents, and a material that these do not find may still exist.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,7 +46,7 @@ DESCENT = TrustRegion(radius=0.3)
 STEPS = 6
 """Number of steps of a descent."""
 AT_ONCE = 8
-"""Number of tasks between two checks of the time."""
+"""Number of tasks between two looks at the time."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ class Reach:
     """Reach of a solid, mode by mode from the second one on.
 
     One material meets the targets of the first so many modes `together`.  Distances up to
-    `had_cents` count as met; the search took so many `seconds`.
+    `had_cents` count as met; the search took so many `seconds` of processor time.
     """
 
     modes: list[ModeReach]
@@ -131,29 +130,29 @@ def reach(problem: DesignProblem, design: Design, seconds: float | None, descent
     """Reach of each mode from the second one on, on the fine solid.
 
     The problem is that of the design's project, with the design's targets; if it meets them all,
-    there is no search.  Descents begin within so many seconds, half of it for modes from the first
-    one on, without a limit if None.  Each question has so many descents at most, each from another
-    one of the best materials.  Raises UserError as `coordinates_of` does, or if a process died, or
-    there are no modes to be had.
+    there is no search.  Descents begin within so many seconds of processor time, half of it for
+    modes from the first one on, without a limit if None.  Each question has so many descents at
+    most, each from another one of the best materials.  Raises UserError as `coordinates_of` does,
+    or if a process died, or there are no modes to be had.
     """
-    begin = time.monotonic()
     objective = problem.setting.objective
     targets, compared = objective.targets.frequencies, objective.compared.tolist()
     own = distances(design.frequencies, objective.targets, objective.absolute)
     missed = [mode for mode in compared if abs(own[mode]) > HAD_CENTS]
     if not missed:
         modes = [_judged(mode, own, targets, compared) for mode in compared]
-        return Reach(modes, len(objective.targets.sounding), time.monotonic() - begin)
+        return Reach(modes, len(objective.targets.sounding), 0.0)
     limit = np.inf if seconds is None else seconds
     with _Descents(problem, descents) as search:
         search.look_at(
             [coordinates_of(problem, design), *_samples(problem.setting.material.dimensions)]
         )
-        together = search.together(begin + 0.5 * limit)
+        together = search.together(0.5 * limit)
         groups = [group for mode in missed for group in ((mode,), _beside(mode, compared))]
-        search.approach(list(dict.fromkeys(groups)), begin + limit)
+        search.approach(list(dict.fromkeys(groups)), limit)
+        seconds = search.seconds
     modes = [_judged(mode, own, targets, compared, search) for mode in compared]
-    return Reach(modes, together, time.monotonic() - begin)
+    return Reach(modes, together, seconds)
 
 
 def distances(hertz: Array, targets: Targets, absolute: bool) -> Array:
@@ -189,6 +188,11 @@ class _Descents:
     def __exit__(self, *_: object) -> None:
         self._pool.close()
 
+    @property
+    def seconds(self) -> float:
+        """Processor time [s], see `Pool.seconds`."""
+        return self._pool.seconds
+
     def look_at(self, materials: Sequence[Array]) -> None:
         """Analyse some materials."""
         self._run([Task(z) for z in materials], np.inf)
@@ -198,41 +202,44 @@ class _Descents:
                 "expected a solid whose parts hang together, raise resolution"
             )
 
-    def together(self, deadline: float) -> int:
+    def together(self, budget: float) -> int:
         """Number of partials from the first one on whose targets one material meets."""
         count = len(self._targets.sounding)
         for last in range(len(self._compared)):
             group = tuple(self._compared[: last + 1])
             if self.known.least(group) > HAD_CENTS:
-                tasks = [self._task(group, rank, deadline) for rank in range(self._most)]
-                self._run(tasks, deadline)
+                tasks = [self._task(group, rank) for rank in range(self._most)]
+                self._run(tasks, budget)
             if self.known.least(group) > HAD_CENTS:
                 return count - len(self._compared) + last
         return count
 
-    def approach(self, groups: Sequence[tuple[int, ...]], deadline: float) -> None:
+    def approach(self, groups: Sequence[tuple[int, ...]], budget: float) -> None:
         """Descend for each group of modes from the materials nearest to its targets."""
         for rank in range(self._most):
             groups = [group for group in groups if self.known.least(group) > HAD_CENTS]
-            tasks = [self._task(group, rank, deadline) for group in groups]
-            self.sought.update(groups[: self._run(tasks, deadline)])
+            tasks = [self._task(group, rank) for group in groups]
+            self.sought.update(groups[: self._run(tasks, budget)])
 
-    def _task(self, group: tuple[int, ...], rank: int, deadline: float) -> Task:
+    def _task(self, group: tuple[int, ...], rank: int) -> Task:
         return Task(
             self.known.best(group, rank),
             options=DESCENT,
             steps=STEPS,
             objective=SomeModes(self._targets, group, self._absolute),
-            limits=DescentLimits(deadline),
         )
 
-    def _run(self, tasks: Sequence[Task], deadline: float) -> int:
-        """Run tasks, a few at once, and keep their materials; the number that ended in time."""
+    def _run(self, tasks: Sequence[Task], budget: float) -> int:
+        """Run tasks, a few at once, and keep their materials; the number that ended within a budget
+        of processor time [s].
+        """
         trials: list[Trial] = []
         in_time = 0
-        while len(trials) < len(tasks) and time.monotonic() < deadline:
-            trials += self._pool.run(tasks[len(trials) : len(trials) + AT_ONCE])
-            if time.monotonic() < deadline:
+        while len(trials) < len(tasks) and self.seconds < budget:
+            limits = DescentLimits(budget - self.seconds)
+            some = tasks[len(trials) : len(trials) + AT_ONCE]
+            trials += self._pool.run([replace(task, limits=limits) for task in some])
+            if self.seconds < budget:
                 in_time = len(trials)
         self.known.add(trials)
         return in_time

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
@@ -31,7 +30,7 @@ class BudgetSpentError(Exception):
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """The best cost after some time [s] and evaluations."""
+    """The best cost after some processor time [s] and evaluations."""
 
     seconds: float
     evaluations: int
@@ -60,14 +59,15 @@ class CheckEntry:
 class Search:
     """Runs tasks until the budget of time [s] and of evaluations is spent; None sets no limit.
 
+    Time is processor time, see `Pool.seconds`, so that a busy machine does not end a search early.
     Descents that run side by side get equal shares of the evaluations that are left, so their
     results do not depend on which one is faster.
 
     Parameters
     ----------
     make_pool
-        Makes the pool of processes, from a function that receives their steps; its start counts as
-        time of the search.
+        Makes the pool of processes, from a function that receives their steps; time counts from
+        then on.
     watch, interrupted
         Called after every round of tasks, and during it; each ends the search by returning True.
         Of an interrupted round the best step is kept, but its evaluations do not count.
@@ -78,9 +78,9 @@ class Search:
     ----------
     best, start
         Best trial of the present leg, and first trial of all.
-    history, checks
+    history, checks, best_checked
         Best cost over time, which may rise where a leg begins; checks on the fine solid, see
-        `sound.design.space_mapping`.
+        `sound.design.space_mapping`, and the best trial by them.
     spent
         Whether the whole budget is used up, or an interrupt came.
     """
@@ -99,6 +99,7 @@ class Search:
         self.history: list[HistoryEntry] = []
         self.spent = False
         self.checks: list[CheckEntry] = []
+        self.best_checked: Trial | None = None
         self._objective: Objective | None = None
         self._is_last = True
         self._most = self._leg_most = evaluations
@@ -107,9 +108,7 @@ class Search:
         self._interrupted = interrupted
         self._step: SearchStep | None = None
         self._done = 0
-        self._begin = time.monotonic()
-        self.deadline = np.inf if seconds is None else self._begin + seconds
-        self._leg_deadline = self.deadline
+        self._budget = self._leg_budget = np.inf if seconds is None else seconds
         self._pool = make_pool(self._told)
 
     def __enter__(self) -> Search:
@@ -120,13 +119,13 @@ class Search:
 
     @property
     def own_seconds(self) -> float:
-        """Seconds since this search began."""
-        return time.monotonic() - self._begin
+        """Processor time [s] of this search."""
+        return self._pool.seconds
 
     @property
     def endless(self) -> bool:
         """Whether the search has no budget."""
-        return self._most is None and not np.isfinite(self.deadline)
+        return self._most is None and not np.isfinite(self._budget)
 
     @property
     def own_evaluations(self) -> int:
@@ -142,13 +141,14 @@ class Search:
         """
         self.best, self._objective = None, objective
         self._is_last = False
-        now, left = time.monotonic(), self.deadline - time.monotonic()
+        now = self.own_seconds
+        left = self._budget - now
         if np.isfinite(left):
             seconds = max(share * left, LEAST_LEG_SECONDS * reserve)
             self._is_last = left - seconds <= (LEAST_LEG_SECONDS + 2.0) * reserve
-            self._leg_deadline = now + (left - reserve if self._is_last else seconds)
+            self._leg_budget = now + (left - reserve if self._is_last else seconds)
         elif self._most is None:
-            self._leg_deadline = now + share * ENDLESS_SECONDS
+            self._leg_budget = now + share * ENDLESS_SECONDS
         if self._most is not None:
             evaluations = max(round(share * (self._most - self._done)), LEAST_LEG)
             if self._most - self._done - evaluations < LEAST_LEG:
@@ -160,20 +160,21 @@ class Search:
 
         Raises BudgetSpentError if that is spent, before or after; the best trial is in `best`.
         """
-        affordable = self._affordable(tasks)
-        if not affordable or time.monotonic() >= self._leg_deadline:
+        begin = self.own_seconds
+        affordable = self._affordable(tasks, self._leg_budget - begin)
+        if not affordable or begin >= self._leg_budget:
             self._end()
         self._step = None
         try:
             # Without a first material there would be no design to write.
             trials = self._pool.run(affordable, self._interrupted if self.start else None)
         except InterruptedRoundError:
-            self._break_off()
-        self._record(trials)
+            self._break_off(begin)
+        self._record(trials, begin)
         if self._watch is not None and self._watch(self):
             self._is_last = True
             self._end()
-        if time.monotonic() >= self._leg_deadline or len(trials) < len(tasks):
+        if self.own_seconds >= self._leg_budget or len(trials) < len(tasks):
             self._end()
         return trials
 
@@ -181,10 +182,10 @@ class Search:
         if self._step is None or step.cost.total < self._step.cost.total:
             self._step = step
 
-    def _break_off(self) -> NoReturn:
+    def _break_off(self, begin: float) -> NoReturn:
         step = self._step
         if step is not None:
-            self._record([Trial(step.z, step.cost, 0, eigenvalues=step.eigenvalues)])
+            self._record([Trial(step.z, step.cost, 0, eigenvalues=step.eigenvalues)], begin)
         self._is_last = True
         self._end()
 
@@ -192,28 +193,28 @@ class Search:
         self.spent = self._is_last
         raise BudgetSpentError
 
-    def _affordable(self, tasks: Sequence[Task]) -> list[Task]:
+    def _affordable(self, tasks: Sequence[Task], seconds: float) -> list[Task]:
         tasks = [replace(task, objective=self._objective) for task in tasks]
-        deadline = self._leg_deadline
         if self._leg_most is None:
-            return [replace(task, limits=DescentLimits(deadline)) for task in tasks]
+            return [replace(task, limits=DescentLimits(seconds)) for task in tasks]
         left = self._leg_most - self._done
         needed = 1 if all(task.options is None for task in tasks) else FEWEST
         count = min(len(tasks), left // needed)
         return [
-            replace(task, limits=DescentLimits(deadline, left // count + (k < left % count)))
+            replace(task, limits=DescentLimits(seconds, left // count + (k < left % count)))
             for k, task in enumerate(tasks[:count])
         ]
 
-    def _record(self, trials: Sequence[Trial]) -> None:
-        now = time.monotonic()
+    def _record(self, trials: Sequence[Trial], begin: float) -> None:
+        """Take up the trials of a round that began after so many seconds of this search."""
+        now = self.own_seconds
         costs = []
         lowest = np.inf if self.best is None else self.history[-1].cost.total
         for trial in trials:
             points = [] if trial.descent is None else trial.descent.costs
             counted = 0
             for point in points:
-                costs.append((point.clock, point.evaluations - counted, point.cost))
+                costs.append((begin + point.seconds, point.evaluations - counted, point.cost))
                 counted = point.evaluations
             if trial.evaluations > counted:
                 costs.append((now, trial.evaluations - counted, trial.cost))
@@ -221,16 +222,16 @@ class Search:
                 self.start = trial
             if self.best is None or trial.cost.total < self.best.cost.total:
                 self.best = trial
-        for clock, evaluations, cost in sorted(costs, key=lambda each: each[0]):
+        for seconds, evaluations, cost in sorted(costs, key=lambda each: each[0]):
             self._done += evaluations
             if cost.total < lowest or not self.history:
                 lowest = cost.total
-                self._note(clock, cost)
+                self._note(seconds, cost)
         self._note(now, self.history[-1].cost)
 
-    def _note(self, clock: float, cost: DesignCost) -> None:
-        seconds = self._before[0] + clock - self._begin
-        self.history.append(HistoryEntry(seconds, self._before[1] + self._done, cost))
+    def _note(self, seconds: float, cost: DesignCost) -> None:
+        spent = self._before[0] + seconds
+        self.history.append(HistoryEntry(spent, self._before[1] + self._done, cost))
 
 
 def require_modes(search: Search) -> Trial:

@@ -7,7 +7,6 @@ amplitudes are shifted by their difference [BCD+04].  The coarse search is then 
 material that was checked.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -137,18 +136,18 @@ class SpaceMapping:
         return off <= MET_CENTS
 
     def _checked(self, search: Search, trial: Trial) -> float:
-        """Check a material, and keep it if it is the best one; the duration [s]."""
-        begin = time.monotonic()
+        """Check a material, and keep it if it is the best one; its processor time [s]."""
+        begin = search.own_seconds
         try:
             checked = self._check(trial)
         except ConvergenceError:  # it has modes on the coarse solid only
             if self.best is None:
                 raise
-            return time.monotonic() - begin
+            return search.own_seconds - begin
         search.checks.append(self._entry(search, checked))
         if self.best is None or checked.total < self.best.total:
-            self.best = checked
-        return time.monotonic() - begin
+            self.best, search.best_checked = checked, trial
+        return search.own_seconds - begin
 
     def _entry(self, search: Search, checked: Checked) -> CheckEntry:
         fine, targets = checked.fine, self._objective.targets

@@ -110,16 +110,19 @@ class Trial:
     gradient."""
     eigenvalues: Array | None = None
     """(N,) [rad^2/s^2] or None: eigenvalues of the elastic modes, if they were found."""
+    seconds: float = 0.0
+    """float [s]: processor time of its process since the round of tasks began there."""
 
 
 @dataclass(frozen=True)
 class SearchStep:
     """A step of a descent, reported while the descent goes on: coordinates z (m,), cost by the
     objective of the descent, eigenvalues (N,) [rad^2/s^2] of the elastic modes, whether on the fine
-    solid.
+    solid, processor time [s] of its process in the round.
     """
 
     z: Array
     cost: DesignCost
     eigenvalues: Array
     fine: bool
+    seconds: float = 0.0

@@ -20,7 +20,7 @@ from sound.clips.targets import Targets
 from sound.strikes import Strike
 
 HISTORY = {
-    "seconds": ("s", "wall time since the optimisation began"),
+    "seconds": ("s", "processor time since the optimisation began"),
     "evaluations": ("1", "modal analyses made so far"),
     "cost": ("1", "w_f E_f + w_a E_a + w_r R of the best material so far (Eq. 4)"),
     "frequency_cost": ("bark^2", "its E_f (Eq. 1)"),

@@ -143,7 +143,7 @@ class OptimiserSettings:
         "hybrid", "either hybrid, or one of its two parts alone, cma or bfgs"
     )
     seconds: Annotated[float, Within(gt=0.0, le=1e8)] | None = option(
-        60.0, "wall time of the search; no limit if null [s]"
+        60.0, "processor time of the search; no limit if null [s]"
     )
     evaluations: Annotated[int, between(1, 10**9)] | None = option(
         None,

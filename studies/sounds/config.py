@@ -46,11 +46,11 @@ class SoundSection:
     )
     seconds: Seconds | None = option(
         None,
-        "wall time of the search for a material, in every edit of an example; each example's own "
-        "if null [s]",
+        "processor time of the search for a material, in every edit of an example; each example's "
+        "own if null [s]",
     )
     compare_seconds: Seconds = option(
-        60.0, "wall time of every optimiser where they are compared, on the frying pans [s]"
+        60.0, "processor time of every optimiser where they are compared, on the frying pans [s]"
     )
     compare_seeds: Runs = option(
         5,

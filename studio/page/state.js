@@ -140,7 +140,7 @@ export class Selection extends Observed {
   }
 
   /**
-   * Keeps to targets that there are: one that is gone gives way to the first one.
+   * Keeps to targets that there are: a new one is selected, and one that is gone gives way to the first one.
    *
    * @param {ServerState} state
    */
@@ -148,9 +148,13 @@ export class Selection extends Observed {
     state.onChange((now, before) => {
       const names = now.targets.map((target) => target.name);
       const chosen = this.current.target;
-      if (chosen !== null && names.includes(chosen)) return;
       const known = (before?.targets ?? []).map((target) => target.name);
       const fresh = names.filter((name) => !known.includes(name));
+      if (before !== null && fresh.length === 1 && names.length === known.length + 1) {
+        this.set({ target: fresh[0] });
+        return;
+      }
+      if (chosen !== null && names.includes(chosen)) return;
       // A renamed target keeps its place in the list.
       const renamed = chosen === null ? undefined : names[known.indexOf(chosen)];
       if (renamed !== undefined && fresh.includes(renamed)) this.set({ target: renamed });

@@ -12,11 +12,15 @@ export interface ModeOfClip {
 export interface Clip {
   clip: string;
   name: string;
-  phase: "waiting" | "listening" | "ready" | "failed";
+  phase: "waiting" | "listening" | "ready" | "failed" | "stopped";
+  /** What is done while it is listened to, or why that failed. */
   message: string | null;
+  /** Between 0 and 1: the share of that which is done. */
+  progress: number | null;
   seconds: number;
   rate_hz: number;
-  explained_decibels: number;
+  /** Between 0 and 1: the share of its energy that is in its modes. */
+  explained: number;
   says: string[];
   modes: ModeOfClip[];
 }
@@ -150,6 +154,14 @@ export interface Progress {
   frequency_cost: number;
   amplitude_cost: number;
   regulariser: number;
+}
+
+/** What was found on the fine solid after so many seconds of a search. */
+export interface FineCheck {
+  seconds: number;
+  cost: number;
+  coarse_rms_cents: number;
+  fine_rms_cents: number;
 }
 
 export interface ArrayHeader {

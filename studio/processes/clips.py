@@ -1,5 +1,7 @@
 """Modes of clips, and their parts as sounds."""
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +12,12 @@ from sound.clips.files import extract_file
 from sound.clips.noise import noise_part
 from sound.clips.wav import as_wav, read_wav
 
-LEAST_SHARE = 1e-12
-"""Smallest share of energy left unexplained that is shown, so that decibels stay finite."""
 SPECTRUM_POINTS = 2000
 """Points of a drawn spectrum; each shows the loudest of its part."""
 LOWEST_HERTZ, FLOOR_DECIBELS = 20.0, -100.0
 """Lowest frequency [Hz] and lowest level [dB] of drawn spectra."""
+TOLD_SECONDS = 0.25
+"""Least time between two pieces of news of an extraction."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +31,27 @@ class ClipFile:
 class ClipsBench:
     """What the process for clips does."""
 
-    def listen(self, clip: ClipFile) -> dict[str, Any]:
-        """Modes of a clip, and what is to be said of them, as the page gets it."""
-        sound = extract_file(clip.path, allow_clipped=clip.allow_clipped)
-        left = max(LEAST_SHARE, 1.0 - sound.evidence["explained"])
+    def listen(
+        self, tell: Callable[[tuple[str, float | None]], None], clip: ClipFile
+    ) -> dict[str, Any]:
+        """Modes of a clip, and what is to be said of them, as the page gets it.
+
+        `tell` receives what is being done, and the share of it that is done or None.
+        """
+        due = 0.0
+
+        def pass_on(doing: str, share: float | None) -> None:
+            nonlocal due
+            if share is None or time.monotonic() >= due:
+                due = time.monotonic() + TOLD_SECONDS
+                tell((doing, share))
+
+        sound = extract_file(clip.path, allow_clipped=clip.allow_clipped, progress=pass_on)
         modes = zip(sound.frequencies, sound.dampings, sound.amplitudes)
         return {
             "seconds": len(sound.residual) / sound.rate,
             "rate_hz": sound.rate,
-            "explained_decibels": float(-10.0 * np.log10(left)),
+            "explained": float(sound.evidence["explained"]),
             "says": remarks(sound.evidence),
             "modes": [
                 {"hertz": float(f), "damping_per_second": float(d), "amplitude": float(a)}

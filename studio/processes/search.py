@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pickle
-import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from threading import Event, Lock, Thread
 from typing import Any
 
@@ -43,35 +43,46 @@ class SearchProcess:
         `initial` is a design whose history goes on; without one, that of `rows` does.
         """
         prepared: DesignProblem = pickle.loads(problem)
-        news = _News(tell)
+        start = None if initial is None else read_design(initial)
+        history = None if coordinates is None else history_of(rows)
+        former = history if start is None else start.history
+        news = _News(tell, 0.0 if former is None or not len(former) else former["seconds"][-1])
         with news:
             design = optimise(
                 prepared,
-                None if initial is None else read_design(initial),
+                start,
                 watch=news.watch,
                 follow=news.follow,
                 coordinates=None if coordinates is None else np.asarray(coordinates),
-                history=None if coordinates is None else history_of(rows),
+                history=history,
             )
         design = with_verdict(design)
         write_design(out, design)
-        z = design.coordinates.tolist()
-        verdict = design.evidence.get("verdict")
-        return {"design": out, "z": z, "rows": rows_of(design.history), "verdict": verdict}
+        return {
+            "design": out,
+            "z": design.coordinates.tolist(),
+            "rows": rows_of(design.history),
+            "checks": news.checks,
+            "verdict": design.evidence.get("verdict"),
+        }
 
 
 class _News:
-    """Tells the best material of a leg as it gets better, and how long the search goes on."""
+    """Tells the best material of a leg as it gets better, the processor time of the search, and
+    its checks on the fine solid.
 
-    def __init__(self, tell: Tell) -> None:
-        self._send = tell
+    Former searches took so many seconds `before`.
+    """
+
+    def __init__(self, tell: Tell, before: float) -> None:
+        self._send, self._before = tell, float(before)
         self._lock = Lock()
         self._ended = Event()
         self._search: Search | None = None
         self._checks = 0
         self._best: tuple[SearchStep, Array] | None = None
         self._is_new = False
-        self._begin = time.monotonic()
+        self._since = self._told = 0.0
 
     def __enter__(self) -> _News:
         self._thread = Thread(target=self._tell_on, daemon=True)
@@ -85,6 +96,7 @@ class _News:
     def follow(self, step: SearchStep, hertz: Array) -> None:
         """Take up a step; costs of steps can be compared between two checks alone."""
         with self._lock:
+            self._since = step.seconds
             checks = 0 if self._search is None else len(self._search.checks)
             best = None if checks != self._checks else self._best
             self._checks = checks
@@ -93,17 +105,28 @@ class _News:
 
     def watch(self, search: Search) -> None:
         """Look at the search after a round."""
-        self._search = search
+        with self._lock:
+            self._search, self._since = search, 0.0
 
     def _tell_on(self) -> None:
         while not self._ended.wait(TOLD_SECONDS):
             with self._lock:
                 best, is_new, search = self._best, self._is_new, self._search
-                self._is_new = False
+                self._is_new, since = False, self._since
             if search is None or not search.history:
                 continue
             entry = search.history[-1]
-            self._send(_row(entry, best, is_new, time.monotonic() - self._begin))
+            self._told = max(self._told, entry.seconds + since)
+            news = _row(entry, best, is_new, self._told) | {"checks": self.checks}
+            if search.best_checked is not None:
+                news["best_checked"] = search.best_checked.z.tolist()
+            self._send(news)
+
+    @property
+    def checks(self) -> list[dict[str, float]]:
+        """What the checks have found, at times since the first of all searches began."""
+        checks = [] if self._search is None else list(self._search.checks)
+        return [{**asdict(each), "seconds": self._before + each.seconds} for each in checks]
 
 
 def _row(
@@ -111,7 +134,7 @@ def _row(
 ) -> dict[str, Any]:
     cost = entry.cost if best is None else best[0].cost
     news: dict[str, Any] = {
-        "seconds": max(entry.seconds, seconds),
+        "seconds": seconds,
         "evaluations": entry.evaluations,
         "cost": cost.total,
         "frequency_cost": cost.frequency,

@@ -128,11 +128,13 @@ class SolidProcess:
         material: str | Sequence[float] | None,
         out: str,
         rows: Sequence[Mapping[str, float]],
+        other: Sequence[float] | None = None,
     ) -> list[float]:
         """Write the design of a material for the present targets; its coordinates.
 
         The material is that of another design, or one of coordinates, or the uniform one; `rows`
-        are the history of how it was found.
+        are the history of how it was found.  The one of `other` coordinates takes its place if its
+        cost is less.
         """
         assert self._problem is not None
         z = material
@@ -141,8 +143,11 @@ class SolidProcess:
         project = self._problem.project
         once = replace(project.optimiser, seconds=None, evaluations=1, workers=1)
         problem = replace(self._problem, project=replace(project, optimiser=once))
-        at = None if z is None else np.asarray(z)
-        made = optimise(problem, coordinates=at, history=history_of(rows))
+        materials = [None if z is None else np.asarray(z)]
+        if other is not None:
+            materials.append(np.asarray(other))
+        designs = [optimise(problem, coordinates=at, history=history_of(rows)) for at in materials]
+        made = min(designs, key=lambda design: design.evidence["cost"])
         write_design(out, made)
         return made.coordinates.tolist()
 
@@ -177,7 +182,11 @@ class SolidProcess:
             sounding.pushed(made.model, made.elastic_modes, self._inward),
             self._at_vertices(made.young),
         )
-        told = {"cost": made.evidence.get("cost"), "rigid_motions": made.model.rigid_modes}
+        told = {
+            "cost": made.evidence.get("cost"),
+            "checked": bool(made.evidence.get("checks")),
+            "rigid_motions": made.model.rigid_modes,
+        }
         return bank(heard, self._positions, self._aimed(), {**told, **header})
 
     def fine_bank_of(self, design: str, header: dict[str, Any]) -> bytes:
@@ -227,7 +236,7 @@ class SolidProcess:
             keys.setdefault("cost", cost_of(objective, material, evaluation).total)
         pushed = sounding.pushed(sounding.model, elastic, self._inward)
         heard = Heard(own, dampings, pushed, self._at_vertices(young))
-        told = {"cost": None, "rigid_motions": sounding.model.rigid_modes}
+        told = {"cost": None, "checked": False, "rigid_motions": sounding.model.rigid_modes}
         return bank(heard, self._positions, aim, {**told, **keys})
 
     @property

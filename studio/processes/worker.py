@@ -83,8 +83,8 @@ class Worker:
         except TimeoutError:
             self.end()
             raise UserError(
-                f"this took longer than {seconds:g} s and was ended; expected something smaller or "
-                "simpler"
+                f"this took more than {seconds:g} s of processor time and was ended; expected "
+                "something smaller or simpler"
             ) from None
 
     async def _answer(self, future: asyncio.Future[Any], seconds: float | None) -> Any:

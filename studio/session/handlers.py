@@ -98,6 +98,16 @@ def remove_target(state: StudioState, target: Text) -> None:
     state.do(f"remove target {target}", changed)
 
 
+def stop_extraction(state: StudioState, clip: Text) -> None:
+    """End the search for a clip's modes."""
+    state.clips.stop(clip)
+
+
+def extract_again(state: StudioState, clip: Text) -> None:
+    """Find the modes of a clip whose search was stopped."""
+    state.clips.begin_again(clip)
+
+
 def change_settings(state: StudioState, settings: dict[str, Any]) -> None:
     """Change keys of the project but its targets, regions and supports."""
     require_values(settings, Project, leave_out=("mesh", "targets", *KINDS))
@@ -156,6 +166,8 @@ HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
     "add_target": add_target,
     "change_target": change_target,
     "remove_target": remove_target,
+    "stop_extraction": stop_extraction,
+    "extract_again": extract_again,
     "add_row": add_row,
     "change_row": change_row,
     "remove_row": remove_row,

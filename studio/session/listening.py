@@ -15,10 +15,11 @@ from studio.session.document import Target
 LISTENING_SECONDS = 180.0
 """Longest time to find the modes of a clip."""
 
+STOPPED = "the search for its modes was stopped, so this clip does not count"
 _NOTHING: dict[str, Any] = {
     "seconds": None,
     "rate_hz": None,
-    "explained_decibels": None,
+    "explained": None,
     "says": [],
     "modes": [],
 }
@@ -30,36 +31,50 @@ class Clip:
     """A clip and what is known of it.
 
     The page names it by `identifier`; `file` is its path from the workspace's folder.  Its `phase`
-    is `waiting`, `listening`, `ready` or `failed`, `message` tells why it failed, `found` are its
-    modes, as the page gets them.  It was listened to for `allow_clipped`.
+    is `waiting`, `listening`, `ready`, `failed` or `stopped`, `message` tells what is done or why
+    it failed, `progress` the share of that which is done, `found` are its modes, as the page gets
+    them.  It was listened to for `allow_clipped`, at the last of its `attempts`.
     """
 
     identifier: str
     file: str
     phase: str = "waiting"
     message: str | None = None
+    progress: float | None = None
     found: dict[str, Any] | None = None
     allow_clipped: bool = False
+    attempts: int = 0
+
+    def become(self, phase: str, message: str | None = None) -> None:
+        """Begin a phase; news of an attempt before it do not count any more."""
+        self.phase, self.message, self.progress = phase, message, None
+        self.attempts += 1
 
 
 class Clips:
-    """All clips that a studio knows, and the process that listens to them.
+    """All clips that a studio knows, the process that finds their modes, and one that plays them.
 
     `path` leads to a file of the workspace; `changed` is called when something else is known of a
-    clip.
+    clip, `told` when a search for modes has come further.
     """
 
-    def __init__(self, path: Callable[[str], Path], changed: Callable[[], None]) -> None:
-        self._path, self._changed = path, changed
-        self._worker = Worker("studio.processes.clips:ClipsBench")
+    def __init__(
+        self,
+        path: Callable[[str], Path],
+        changed: Callable[[], None],
+        told: Callable[[], None],
+    ) -> None:
+        self._path, self._changed, self._told = path, changed, told
+        self._worker, self._player = (Worker("studio.processes.clips:ClipsBench") for _ in range(2))
         self._known: dict[str, Clip] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
     def end(self) -> None:
-        """End the process."""
+        """End the processes."""
         for task in self._tasks:
             task.cancel()
         self._worker.end()
+        self._player.end()
 
     @property
     def are_listened_to(self) -> bool:
@@ -87,7 +102,8 @@ class Clips:
                 continue
             clip = self.add(target.clip)
             if clip.phase == "waiting" or clip.allow_clipped != target.allow_clipped:
-                clip.phase, clip.allow_clipped = "listening", target.allow_clipped
+                clip.become("listening")
+                clip.allow_clipped = target.allow_clipped
                 task = asyncio.ensure_future(self._listen(clip))
                 self._tasks.add(task)
                 task.add_done_callback(self._tasks.discard)
@@ -95,25 +111,57 @@ class Clips:
                 heard.append(target)
         return heard
 
-    async def _listen(self, clip: Clip) -> None:
-        try:
-            clip.found = await self._worker.call(
-                "listen", self._file(clip), seconds=LISTENING_SECONDS
-            )
-            clip.phase, clip.message = "ready", None
-        except UserError as error:
-            clip.phase, clip.message, clip.found = "failed", str(error), None
+    def stop(self, identifier: str) -> None:
+        """End the search for a clip's modes; those of other clips that go on begin anew.
+
+        Raises NotFoundError if there is no such clip, and UserError if there is nothing to end.
+        """
+        stopped = self.named(identifier)
+        if stopped.phase != "listening":
+            raise UserError(f"{stopped.file}: its modes are not being sought; nothing is stopped")
+        for clip in self._known.values():
+            if clip.phase == "listening":
+                clip.become("waiting")
+        stopped.become("stopped", STOPPED)
+        self._worker.end()
         self._changed()
+
+    def begin_again(self, identifier: str) -> None:
+        """Find the modes of a clip whose search was stopped; raises NotFoundError as `named`."""
+        clip = self.named(identifier)
+        if clip.phase == "stopped":
+            clip.become("waiting")
+            self._changed()
+
+    async def _listen(self, clip: Clip) -> None:
+        attempt = clip.attempts
+
+        def tell(news: tuple[str, float | None]) -> None:
+            if clip.attempts == attempt:
+                clip.message, clip.progress = news
+                self._told()
+
+        found, message = None, None
+        try:
+            found = await self._worker.call(
+                "listen", self._file(clip), seconds=LISTENING_SECONDS, tell=tell
+            )
+        except UserError as error:
+            message = str(error)
+        if clip.attempts == attempt:
+            clip.found = found
+            clip.become("failed" if found is None else "ready", message)
+            self._changed()
 
     async def part(self, identifier: str, part: str) -> bytes:
         """A clip's part as the content of a WAV file."""
-        content: bytes = await self._worker.call("part", self._file(self.named(identifier)), part)
+        content: bytes = await self._player.call("part", self._file(self.named(identifier)), part)
         return content
 
     async def spectrum(self, identifier: str) -> dict[str, list[float]]:
         """A clip's spectrum."""
         partials: dict[str, list[float]]
-        partials = await self._worker.call("spectrum", self._file(self.named(identifier)))
+        partials = await self._player.call("spectrum", self._file(self.named(identifier)))
         return partials
 
     def state(self) -> list[dict[str, Any]]:
@@ -124,6 +172,7 @@ class Clips:
                 "name": Path(clip.file).name,
                 "phase": clip.phase,
                 "message": clip.message,
+                "progress": clip.progress,
                 **(clip.found or _NOTHING),
             }
             for clip in self._known.values()

@@ -46,15 +46,18 @@ async def designed(state: StudioState) -> str:
         raise UserError("there is no target with a clip yet, and so no design")
     material = state.document.material
     given: str | list[float] | None = None
-    rows = []
+    rows, other = [], None
     if material is not None and material.design is None:
         given, rows = list(material.z), state.search.rows
+        if material == state.search.found:
+            # Of a search that was stopped: it was found on the coarse solid, and not checked yet.
+            other = state.search.best_checked
     elif material is not None:
         given = material.design
         if await state.solid.ask("is_of_targets", given):
             return str(given)
     out = str(state.workspace.new_design())
-    made = Material(tuple(await state.solid.ask("design", given, out, rows)), out)
+    made = Material(tuple(await state.solid.ask("design", given, out, rows, other)), out)
     if state.document.material == material:
         state.history.replace(replace(state.document, material=made))
         state.changed()

@@ -27,7 +27,8 @@ class Live:
 
 class Searching:
     """A search at a time, in the phase `idle`, `starting` or `running`; `rows` are the history of
-    the present material.
+    the present material, and `checks` what was found on the fine solid meanwhile.  `found` is the
+    material that was told last, and `best_checked` are the coordinates of the best one by checks.
 
     `told` is called with every piece of news, the event `progress`, and `found` with every better
     material.
@@ -36,11 +37,15 @@ class Searching:
     def __init__(
         self, told: Callable[[dict[str, Any]], None], found: Callable[[Live], None]
     ) -> None:
-        self._told, self._found = told, found
+        self._told, self._tell_found = told, found
         self._worker = Worker("studio.processes.search:SearchProcess")
         self._is_broken_off = False
         self.phase = "idle"
         self.rows: list[dict[str, float]] = []
+        self.checks: list[dict[str, float]] = []
+        self._former_checks: list[dict[str, float]] = []
+        self.found: Material | None = None
+        self.best_checked: list[float] | None = None
 
     def warm(self) -> None:
         """Start the process, so that a search begins sooner."""
@@ -53,6 +58,8 @@ class Searching:
         if there was nothing to search from, or the process ended.
         """
         self.phase, self._is_broken_off = "starting", False
+        self._former_checks = self.checks
+        self.found = self.best_checked = None
         initial = None if material is None else material.design
         z = None if material is None or material.design is not None else list(material.z)
         try:
@@ -66,6 +73,7 @@ class Searching:
         finally:
             self.phase = "idle"
         self.rows = _thinned(result["rows"])
+        self.checks = [*self._former_checks, *result["checks"]]
         return Material(tuple(result["z"]), result["design"])
 
     def end(self) -> None:
@@ -79,7 +87,7 @@ class Searching:
 
     def forget(self) -> None:
         """Begin a new history: that of another solid."""
-        self.rows = []
+        self.rows, self.checks = [], []
 
     def _take(self, news: dict[str, Any]) -> None:
         if self._is_broken_off:
@@ -87,12 +95,15 @@ class Searching:
         if self.phase == "starting":
             self.phase = "running"
         z, hertz = news.pop("z", None), news.pop("hertz", None)
+        self.checks = [*self._former_checks, *news.pop("checks")]
+        self.best_checked = news.pop("best_checked", None)
         same = self.rows and all(self.rows[-1][key] == news[key] for key in _COUNTED)
         rows = self.rows[:-1] if same else self.rows
         self.rows = _thinned([*rows, news])
-        self._told(news)
+        self._told({**news, "checks": self.checks})
         if z is not None:
-            self._found(Live(Material(tuple(z)), hertz, news["cost"]))
+            self.found = Material(tuple(z))
+            self._tell_found(Live(self.found, hertz, news["cost"]))
 
 
 def _thinned(rows: list[dict[str, float]]) -> list[dict[str, float]]:

@@ -79,7 +79,7 @@ class StudioState:
         self.autosave = Autosave(lambda: session(self), workspace.write_session)
         self.solid = SolidClient(workspace.folder, self.changed)
         self.placing = Placing(workspace.folder, self.changed)
-        self.clips = Clips(workspace.path, self.changed_and_woken)
+        self.clips = Clips(workspace.path, self.changed_and_woken, self.changed)
         self.search = Searching(self._progressed, self._found)
         self._phase = self.search.phase
 
@@ -104,7 +104,7 @@ class StudioState:
         self.placed.set()
 
     def _history_event(self) -> dict[str, Any]:
-        return {"event": "history", "rows": self.search.rows}
+        return {"event": "history", "rows": self.search.rows, "checks": self.search.checks}
 
     def _progressed(self, news: dict[str, Any]) -> None:
         if self._phase != self.search.phase:

@@ -1,5 +1,7 @@
 /** The selected target, its clip, and what is asked of the server and of the sound for it. */
 
+import { agreed } from "./question.js";
+
 /** @typedef {import("../main.js").Parts} Parts */
 /** @typedef {import("../types.js").State} State */
 /** @typedef {import("../types.js").Target} Target */
@@ -115,7 +117,26 @@ export function strikeTarget(parts, target) {
 }
 
 /**
- * Sends a sound to the server and makes it a target's clip.
+ * Whether a target may get another clip: one that it has already is replaced only if somebody agrees.
+ *
+ * @param {Parts} parts
+ * @param {string} target its name
+ * @param {string} name of the other clip
+ * @returns {Promise<boolean>}
+ */
+export async function mayReplaceClip(parts, target, name) {
+  const now = parts.state.current;
+  const present = clipOf(now, now?.targets.find((one) => one.name === target) ?? null);
+  if (!present) return true;
+  return agreed(
+    `${target} has the clip ${present.name}. Replace it by ${name}?`,
+    `Replace by ${name}`,
+    `Keep ${present.name}`,
+  );
+}
+
+/**
+ * Sends a sound to the server and makes it a target's clip; asks before that replaces another one.
  *
  * @param {Parts} parts
  * @param {string} target its name
@@ -125,6 +146,7 @@ export function strikeTarget(parts, target) {
 export async function giveClip(parts, target, name, sound) {
   return attempt(parts, async () => {
     const clip = await parts.connection.upload("clip", name, sound);
+    if (!(await mayReplaceClip(parts, target, name))) return; // it stays in the list of clips
     await parts.connection.call("change_target", { target, clip });
   });
 }

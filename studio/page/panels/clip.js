@@ -132,7 +132,7 @@ export function makeClip(element, parts) {
     const used = clip.modes.filter((mode) => !isLeftOut(target, mode));
     setText(
       title,
-      `${clip.name}: ${Math.min(used.length, target.modes ?? used.length)} of ${clip.modes.length} modes used; all explain ${fixed(clip.explained_decibels, 1)} dB`,
+      `${clip.name}: ${Math.min(used.length, target.modes ?? used.length)} of ${clip.modes.length} modes used; all explain ${fixed(100 * clip.explained, 2)} % of the energy`,
     );
     keepList(rows, clip.modes, (mode) => String(mode.hertz), create, (row, mode) => update(row, mode, target, loudest));
     keepList(says, clip.says, (_text, index) => String(index), () => make("li"), setText);
@@ -273,6 +273,7 @@ function whyNone(target, clip) {
   if (!target) return "Select a target to see what is in its clip.";
   if (!clip) return `${target.name} has no clip yet.`;
   if (clip.phase === "failed") return clip.message ?? `${clip.name} could not be read.`;
+  if (clip.phase === "stopped") return `The search for the modes of ${clip.name} was stopped.`;
   return `The modes of ${clip.name} are being found \u2026`;
 }
 

@@ -1,11 +1,13 @@
 /** The cost over the time of the search, with its parts. */
 
-import { make, setAttribute, setText } from "./dom.js";
+import { keepList, make, setAttribute, setText } from "./dom.js";
+import { explanations } from "./cost-words.js";
 import { makeLegend } from "./legend.js";
-import { fixed, significant, withSeconds } from "./numbers.js";
-import { axis, colour, makePlot } from "./plots.js";
+import { change, significant, withSeconds } from "./numbers.js";
+import { axis, colour, makePlot, roundNumbers } from "./plots.js";
 
 /** @typedef {import("../types.js").Progress} Progress */
+/** @typedef {import("../types.js").FineCheck} FineCheck */
 /** @typedef {import("./legend.js").Sign} Sign */
 
 const HEIGHT = 200;
@@ -13,8 +15,6 @@ const HEIGHT = 200;
 const MOST_ROWS = 1000;
 /** Parts this far below the cost say nothing, and would squeeze what does. */
 const LEAST_SHARE = 1e-4;
-/** A smaller fall is none that is worth to be told. */
-const LEAST_PERCENT = 0.05;
 
 /** @type {{ key: keyof Progress, text: string, sign: Sign, kind: string, dash: number[], width: number }[]} */
 const SERIES = [
@@ -34,6 +34,10 @@ export function makeCost(element, parts) {
   const { connection } = parts;
   /** @type {Progress[]} */
   let rows = [];
+  /** @type {FineCheck[]} */
+  let checks = [];
+  /** Cost on the fine solid of the material that sounds; null if it is not known. @type {number | null} */
+  let present = null;
   /** @type {import("uplot") | null} */
   let plot = null;
   let isWaiting = false;
@@ -41,12 +45,14 @@ export function makeCost(element, parts) {
   const none = make("p", { class: "hint" }, "Optimise, and the cost is drawn here while it falls.");
   const value = make("p", { class: "figure-line" });
   const picture = make("div", { class: "plot", role: "img" });
+  const says = make("ul", { class: "says", hidden: true });
   const body = make(
     "div",
     { hidden: true },
     value,
     makeLegend(SERIES.map(({ sign, text, kind }) => ({ sign, text, kind }))),
     picture,
+    says,
   );
   element.append(none, body);
 
@@ -59,7 +65,14 @@ export function makeCost(element, parts) {
     if (!first || !last) return;
     const compared = rows.length > 1 ? `, ${change(first.cost, last.cost)}` : "";
     const effort = `${last.evaluations} ${last.evaluations === 1 ? "evaluation" : "evaluations"} in ${withSeconds(last.seconds)}`;
-    setText(value, `${significant(last.cost, 4)}${compared}; ${effort}`);
+    const [fineFirst] = checks;
+    const fineCost = present ?? Math.min(...checks.map((check) => check.cost));
+    const told = fineFirst
+      ? `${significant(fineCost, 4)} on the fine solid, ${change(fineFirst.cost, fineCost)}`
+      : `${significant(last.cost, 4)}${compared}`;
+    setText(value, `${told}; ${effort}`);
+    keepList(says, explanations(rows, checks, present), (_text, index) => String(index), () => make("li"), setText);
+    says.hidden = says.children.length === 0;
     setAttribute(
       picture,
       "aria-label",
@@ -81,9 +94,11 @@ export function makeCost(element, parts) {
           y: { distr: 3, range: costRange },
         },
         axes: [
-          axis("Time [s]", { size: 34 }),
+          axis("Processor time [s]", { size: 34 }),
           axis("Cost", {
             size: 54,
+            // Those of the library have no end where the lowest is between two powers of ten.
+            splits: (_one, _axis, low, high) => roundNumbers(low, high),
             values: (_one, splits) => splits.map((split) => (split === null ? "" : significant(split, 1))),
           }),
         ],
@@ -119,8 +134,13 @@ export function makeCost(element, parts) {
     requestAnimationFrame(show);
   }
 
+  connection.onBinary("bank", (header) => {
+    present = header.checked ? header.cost : null;
+    later();
+  });
   connection.onEvent("history", (event) => {
     rows = [...event.rows];
+    checks = event.checks;
     later();
   });
   connection.onEvent("progress", (event) => {
@@ -128,21 +148,9 @@ export function makeCost(element, parts) {
     // Time runs one way: a row from before the last one is of another search.
     if (last && event.seconds < last.seconds) rows = [];
     rows.push(event);
+    checks = event.checks;
     later();
   });
-}
-
-/**
- * How far a cost is from the first one, in words.
- *
- * @param {number} first
- * @param {number} last
- */
-function change(first, last) {
-  const fall = first > 0 ? 100 * (1 - last / first) : 0;
-  if (Math.abs(fall) < LEAST_PERCENT) return "as at first";
-  if (fall < 0) return `${fixed(-fall, 1)} % above the first one`;
-  return `${fixed(fall, fall > 99 ? 2 : 1)} % below the first one`;
 }
 
 /** @param {unknown} value @returns {number | null} as logarithms need it */

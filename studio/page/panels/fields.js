@@ -16,6 +16,8 @@ import { boundsOf, divided, FieldError, readNumber, shown, typesOf, written } fr
  * @property {() => void} focus
  */
 
+const GIGA = 1e9;
+
 /** @type {Record<string, string>} */
 const NAMES = {
   resolution: "Resolution",
@@ -60,12 +62,58 @@ export function isShown(schema) {
  * @returns {Field}
  */
 export function makeField(path, schema, changed) {
+  const [, unit] = divided(schema.description ?? "");
+  if (unit === "Pa") return inGigapascals(makeField(path, gigapascalsOf(schema), changed));
   const frame = frameOf(path, schema);
   const kinds = typesOf(schema);
   if (schema.enum) return choiceField(frame, schema.enum, changed);
   if (kinds.includes("boolean")) return switchField(frame, changed);
   if (kinds.includes("array")) return pairField(frame, schema, changed);
   return numberField(frame, schema, changed);
+}
+
+/**
+ * A schema of pascals for a field that shows gigapascals, as all of the page does.
+ *
+ * @param {Schema} schema
+ * @returns {Schema}
+ */
+function gigapascalsOf(schema) {
+  const { minimum, maximum, items, description = "" } = schema;
+  return {
+    ...schema,
+    description: description.replace("[Pa]", "[GPa]"),
+    default: scaled(schema.default, 1 / GIGA),
+    ...(minimum !== undefined && { minimum: minimum / GIGA }),
+    ...(maximum !== undefined && { maximum: maximum / GIGA }),
+    ...(items && { items: gigapascalsOf(items) }),
+  };
+}
+
+/**
+ * A field of gigapascals as one of pascals.
+ *
+ * @param {Field} field
+ * @returns {Field}
+ */
+function inGigapascals(field) {
+  return {
+    ...field,
+    read: () => scaled(field.read(), GIGA),
+    write: (value) => field.write(scaled(value, 1 / GIGA)),
+  };
+}
+
+/**
+ * A number, or several, times a factor, without the digits that rounding adds.
+ *
+ * @param {unknown} value
+ * @param {number} factor
+ * @returns {unknown}
+ */
+function scaled(value, factor) {
+  if (Array.isArray(value)) return value.map((each) => scaled(each, factor));
+  return typeof value === "number" ? Number((value * factor).toPrecision(12)) : value;
 }
 
 /**

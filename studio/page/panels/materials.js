@@ -1,6 +1,7 @@
 /** Named materials, and the constants that a region has of them and of its own. */
 
 import { NO_COLOUR, apart } from "../solid/palette.js";
+import { make } from "./dom.js";
 
 /** @typedef {import("../types.js").NamedMaterial} NamedMaterial */
 /** @typedef {import("../types.js").Region} Region */
@@ -84,6 +85,17 @@ export function constantsOf(region, material) {
  */
 export function grainOf(region, material) {
   return constantsOf(region, material).wood ? (region.grain ?? [1, 0, 0]) : null;
+}
+
+/** @param {NamedMaterial} material @returns {[string, string]} its value and text in a list of choices */
+export function choiceOf({ name, wood }) {
+  return [name, wood ? `${name} (wood, by its grain)` : name];
+}
+
+/** @param {NamedMaterial} material @returns {HTMLOptionElement} of a list of choices */
+export function optionOf(material) {
+  const [value, text] = choiceOf(material);
+  return make("option", { value, title: material.about }, text);
 }
 
 /**

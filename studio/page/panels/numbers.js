@@ -3,6 +3,8 @@
 const CENTS = 1200;
 const MINUS = "\u2212";
 const NOTHING = "\u2013";
+/** A smaller fall is none that is worth to be told. */
+const LEAST_PERCENT = 0.05;
 
 /**
  * Distance of a frequency above another one [cents].
@@ -119,4 +121,17 @@ export function withSeconds(seconds) {
   if (seconds < 60) return `${fixed(seconds, seconds < 10 ? 1 : 0)} s`;
   const whole = Math.round(seconds);
   return `${Math.floor(whole / 60)} min ${whole % 60} s`;
+}
+
+/**
+ * How far a cost is from the first one, in words.
+ *
+ * @param {number} first
+ * @param {number} last
+ */
+export function change(first, last) {
+  const fall = first > 0 ? 100 * (1 - last / first) : 0;
+  if (Math.abs(fall) < LEAST_PERCENT) return "as at first";
+  if (fall < 0) return `${fixed(-fall, 1)} % above the first one`;
+  return `${fixed(fall, fall > 99 ? 2 : 1)} % below the first one`;
 }

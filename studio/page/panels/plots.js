@@ -94,7 +94,7 @@ export function hertzAxis() {
  * @param {number} high
  * @returns {number[]}
  */
-function roundNumbers(low, high) {
+export function roundNumbers(low, high) {
   const found = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
     for (let digit = 1; digit < 10; digit += 1) {

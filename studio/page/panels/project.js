@@ -7,6 +7,8 @@ import { withSeconds } from "./numbers.js";
 
 /** @typedef {import("../types.js").State} State */
 
+/** Phases of clips that a search leaves out. */
+const UNUSABLE = ["failed", "stopped"];
 const NAMES = /^[A-Za-z0-9_-]{1,64}$/;
 
 /**
@@ -181,7 +183,7 @@ function whyNot(state) {
   if (state.solid.phase === "failed") return state.solid.message ?? "The solid could not be prepared.";
   if (state.targets.length === 0) return "Add a target first: a point and the clip that it shall sound like.";
   if (usedTargets(state).length > 0) return "";
-  const failed = state.clips.find((clip) => clip.phase === "failed");
+  const failed = state.clips.find((clip) => UNUSABLE.includes(clip.phase));
   if (failed) return `${failed.name} cannot be used: choose another clip.`;
   return `Give ${state.targets[0]?.name ?? "the target"} a clip first.`;
 }
@@ -205,6 +207,6 @@ function noteOn(state) {
  * @param {State} state
  */
 function usedTargets(state) {
-  const good = state.clips.filter((clip) => clip.phase !== "failed").map((clip) => clip.clip);
+  const good = state.clips.filter((clip) => !UNUSABLE.includes(clip.phase)).map((clip) => clip.clip);
   return state.targets.filter((target) => target.clip !== null && good.includes(target.clip));
 }

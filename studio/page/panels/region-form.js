@@ -1,7 +1,7 @@
 /** The form of the selected region: what it is made of, and where it is. */
 
 import { button, make, setText } from "./dom.js";
-import { constantsOf } from "./materials.js";
+import { choiceOf, constantsOf } from "./materials.js";
 import { choiceField, numberField, textField, vectorField } from "./row-fields.js";
 import { makePaintControls, placedBy } from "./rows.js";
 
@@ -17,6 +17,8 @@ const PLACES = [
   ["part", "a named part of the mesh"],
   ["mesh", "inside another mesh"],
 ];
+/** What a region without constants of its own has of its material. */
+const OF_THE_MATERIAL = { young: null, poisson: null, density: null, loss_factor: null };
 const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 
 /**
@@ -36,7 +38,7 @@ export function makeRegionForm(parts, rows) {
   const name = textField("Name", keyed("name"), { maxlength: 100 });
   const material = choiceField("Material", [["", "of its own"]], {
     ...keyed("material"),
-    take: (value) => void rows.change({ material: value || null, young: null, poisson: null, density: null, loss_factor: null }),
+    take: (value) => void rows.change(value ? { ...OF_THE_MATERIAL, material: value } : ownConstants()),
   });
   const about = make("p", { class: "hint" });
   const young = numberField("E", "GPa", 1e9, keyed("young"));
@@ -102,6 +104,14 @@ export function makeRegionForm(parts, rows) {
   function chosen() {
     const number = rows.chosen();
     return number === null ? undefined : state.current?.regions[number];
+  }
+
+  /** @returns {Record<string, unknown>} changes after which the region has its constants without a name */
+  function ownConstants() {
+    const region = chosen();
+    if (!region) return {};
+    const { young, poisson, density, loss } = constantsOf(region, materials.named(region.material));
+    return { material: null, young, poisson, density, loss_factor: loss };
   }
 
   /** @param {Place} chosenPlace */
@@ -192,9 +202,4 @@ export function makeRegionForm(parts, rows) {
     show();
   });
   return { element, show };
-}
-
-/** @param {import("../types.js").NamedMaterial} material @returns {[string, string]} */
-function choiceOf({ name, wood }) {
-  return [name, wood ? `${name} (wood, by its grain)` : name];
 }

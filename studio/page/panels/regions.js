@@ -2,7 +2,7 @@
 
 import { styleOf } from "../solid/palette.js";
 import { button, find, keepList, make, setText } from "./dom.js";
-import { coloursOf, constantsOf } from "./materials.js";
+import { coloursOf, constantsOf, optionOf } from "./materials.js";
 import { makeRegionForm } from "./region-form.js";
 import { makeRows, placeOf } from "./rows.js";
 import { written } from "./values.js";
@@ -29,7 +29,7 @@ export function makeRegions(element, parts) {
   const none = make(
     "p",
     { class: "hint" },
-    "All of the solid is of one material, that of the settings. Add regions for several: iron with a handle of beech.",
+    "All of the solid is of one material, that of the settings. Add a region to make it of steel, glass or wood, and more regions for several: iron with a handle of beech.",
   );
   const lines = make("tbody");
   const table = make(
@@ -53,17 +53,19 @@ export function makeRegions(element, parts) {
     lines,
   );
   const add = button("Add a region", () => void addRegion(), { class: "main" });
+  const preset = make("select", { id: "region-preset" });
   const said = make("p", { class: "field-error", role: "status", hidden: true });
   const form = makeRegionForm(parts, rows);
   const frame = make("div", { class: "scroll" }, table);
-  element.append(none, frame, make("div", { class: "row" }, add), said, form.element);
+  element.append(none, frame, make("div", { class: "row" }, add, make("label", { for: "region-preset" }, "made of"), preset), said, form.element);
 
   async function addRegion() {
     const regions = state.current?.regions ?? [];
+    const material = preset.value;
     // The first one is all of the solid, those after it are painted over it.
     if (regions.length === 0) {
-      await rows.addRow({ name: "body" });
-    } else if (await rows.addRow({ name: freeName(regions), painted: [] })) {
+      await rows.addRow({ name: "body", material });
+    } else if (await rows.addRow({ name: freeName(regions), material, painted: [] })) {
       selection.set({ tool: "paint", erasing: false, colouring: "regions" });
     }
   }
@@ -122,7 +124,7 @@ export function makeRegions(element, parts) {
     const isReady = (state.current?.solid?.surface ?? null) !== null;
     none.hidden = regions.length > 0;
     frame.hidden = regions.length === 0;
-    add.disabled = !isReady;
+    add.disabled = !isReady || materials.all.length === 0;
     // The sentence about a first region that was refused has no row to stand at.
     const refused = regions.length === 0 ? rows.faultOf(0) : null;
     said.hidden = refused === null;
@@ -138,7 +140,10 @@ export function makeRegions(element, parts) {
     form.show();
   }
 
-  materials.onLoad(show);
+  materials.onLoad(() => {
+    preset.replaceChildren(...materials.all.map(optionOf));
+    show();
+  });
   state.onChange(show);
   selection.onChange(show);
 }

@@ -2,11 +2,18 @@
 
 import { button, make, setText } from "./dom.js";
 import { isShown, makeField } from "./fields.js";
+import { optionOf } from "./materials.js";
 import { FieldError } from "./values.js";
 
 /** @typedef {import("./fields.js").Field} Field */
 /** @typedef {import("./values.js").Schema} Schema */
 
+/** @type {[string, "young" | "density" | "poisson"][]} settings that a material by name has, and its constants */
+const CONSTANTS = [
+  ["material.young", "young"],
+  ["density", "density"],
+  ["poisson", "poisson"],
+];
 const IMPORTANT = [
   "resolution",
   "coarsen",
@@ -39,7 +46,7 @@ const SECTIONS = {
  * @param {import("../main.js").Parts} parts
  */
 export function makeSettings(element, parts) {
-  const { connection, state } = parts;
+  const { connection, state, materials } = parts;
   /** @type {Field[]} */
   let fields = [];
   /** Paths of fields that somebody typed into since they were last applied. */
@@ -61,6 +68,36 @@ export function makeSettings(element, parts) {
     make("div", { class: "form-actions" }, apply, discard, said),
   );
   element.append(form);
+
+  const preset = make("select", { id: "material-preset", onchange: takePreset });
+  const presetRow = make(
+    "div",
+    { class: "field" },
+    make("label", { class: "field-label", for: "material-preset" }, "Material at the start"),
+    make("div", { class: "field-control" }, preset),
+    make("p", { class: "field-help" }, "Sets the modulus, the density and Poisson's ratio below. Woods with a grain are chosen for regions."),
+  );
+
+  /** Materials by name that are the same in all directions, as a solid without regions is. */
+  const presets = () => materials.all.filter((material) => !material.wood);
+
+  function takePreset() {
+    const material = materials.named(preset.value);
+    for (const [path, key] of material ? CONSTANTS : []) {
+      fields.find((field) => field.path.join(".") === path)?.write(material?.[key]);
+      edited.add(path);
+    }
+    tell("");
+    show();
+  }
+
+  /** @returns {string} name of the material that the settings are those of; empty if there is none */
+  function presetNow() {
+    const settings = state.current?.settings;
+    const is = (/** @type {import("../types.js").NamedMaterial} */ material) =>
+      CONSTANTS.every(([path, key]) => valueAt(settings, path.split(".")) === material[key]);
+    return presets().find(is)?.name ?? "";
+  }
 
   /** @param {Event} event */
   async function send(event) {
@@ -121,6 +158,8 @@ export function makeSettings(element, parts) {
       if (!isEdited) field.write(valueAt(state.current?.settings, field.path));
       field.mark(isEdited);
     }
+    presetRow.hidden = hasRegions;
+    if (!CONSTANTS.some(([path]) => edited.has(path))) preset.value = presetNow();
     apply.disabled = edited.size === 0 || !state.current;
     discard.disabled = edited.size === 0;
     const many = edited.size === 1 ? "1 change waits" : `${edited.size} changes wait`;
@@ -155,6 +194,7 @@ export function makeSettings(element, parts) {
       return make("fieldset", {}, make("legend", {}, name), ...here.map((field) => field.element));
     });
     body.replaceChildren(
+      presetRow,
       ...first.map((field) => field.element),
       make("details", { class: "more" }, make("summary", {}, "More settings"), ...groups),
     );
@@ -173,6 +213,10 @@ export function makeSettings(element, parts) {
     }
   }
 
+  materials.onLoad(() => {
+    preset.replaceChildren(make("option", { value: "" }, "of its own"), ...presets().map(optionOf));
+    show();
+  });
   state.onChange((now, before) => {
     if (!before || now.settings !== before.settings || now.regions !== before.regions) show();
   });

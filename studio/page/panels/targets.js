@@ -1,8 +1,9 @@
 /** Targets: the points that are struck, their clips, and what one can hear of both. */
 
-import { ask, attempt, chosenTarget, clipOf, giveClip, playClip, strikeTarget } from "./chosen.js";
+import { CLIP_ENDINGS } from "../solid/files.js";
+import { ask, attempt, chosenTarget, clipOf, giveClip, mayReplaceClip, playClip, strikeTarget } from "./chosen.js";
 import { button, find, keepList, make, setText, setValue } from "./dom.js";
-import { withSeconds } from "./numbers.js";
+import { fixed, withSeconds } from "./numbers.js";
 import { makeRecording } from "./recording.js";
 
 /** @typedef {import("../types.js").Target} Target */
@@ -111,7 +112,7 @@ function makeDetails(parts) {
     type: "file",
     class: "hidden",
     id: "target-file",
-    accept: ".wav,audio/wav",
+    accept: CLIP_ENDINGS.join(","),
     tabindex: -1,
     "aria-hidden": "true",
     onchange: upload,
@@ -120,7 +121,11 @@ function makeDetails(parts) {
     const target = now();
     if (target) void recording.start(target.name);
   }, { id: "record-clip" });
-  const said = make("p", { class: "hint", role: "status" });
+  const said = make("p", { class: "hint", id: "target-says", role: "status" });
+  const bar = make("progress", { max: 1, "aria-labelledby": "target-says" });
+  const stopSearch = button("Stop finding modes", () => askOfClip("stop_extraction"));
+  const searchAgain = button("Find its modes", () => askOfClip("extract_again"));
+  const extraction = make("div", { class: "row extraction" }, bar, stopSearch, searchAgain);
   const listen = PARTS.map(([part, text, title]) => button(text, () => void playClip(parts, now(), part), { title }));
   const struck = button("Solid", () => strikeTarget(parts, now()), { title: "The solid, struck there" });
   const stop = button("Stop", () => parts.player.stop(), { class: "quiet", title: "Stop the clip that plays" });
@@ -160,6 +165,7 @@ function makeDetails(parts) {
     ),
     recording.element,
     said,
+    extraction,
     make(
       "div",
       { class: "row tight", role: "group", "aria-label": "Listen" },
@@ -178,6 +184,12 @@ function makeDetails(parts) {
     make("div", { class: "row" }, move, remove),
   );
 
+  /** @param {string} name of what is asked of the server for the clip of the selected target */
+  function askOfClip(name) {
+    const clip = clipOf(state.current, now());
+    if (clip) void ask(parts, name, { clip: clip.clip });
+  }
+
   async function rename() {
     const target = now();
     const wanted = name.value.trim();
@@ -187,9 +199,12 @@ function makeDetails(parts) {
     }
   }
 
-  function choose() {
+  async function choose() {
     const target = now();
-    if (target) void ask(parts, "change_target", { target: target.name, clip: clips.value || null });
+    const clip = state.current?.clips.find((one) => one.clip === clips.value);
+    if (!target) return;
+    if (clip && !(await mayReplaceClip(parts, target.name, clip.name))) show();
+    else await ask(parts, "change_target", { target: target.name, clip: clip?.clip ?? null });
   }
 
   async function upload() {
@@ -231,6 +246,12 @@ function makeDetails(parts) {
     );
     clips.value = target.clip ?? "";
     setText(said, sentence(clip));
+    const isSought = clip?.phase === "listening";
+    bar.hidden = stopSearch.hidden = !isSought;
+    searchAgain.hidden = clip?.phase !== "stopped";
+    extraction.hidden = !isSought && searchAgain.hidden;
+    if (clip?.progress == null) bar.removeAttribute("value");
+    else bar.value = clip.progress;
     listen.forEach((press, index) => {
       press.disabled = !clip || (index > 0 && clip.phase !== "ready");
     });
@@ -250,11 +271,17 @@ function shortly(clip) {
   if (!clip) return "no clip";
   const said = {
     waiting: "waits",
-    listening: "listening \u2026",
+    listening: `finding modes${percent(clip)}`,
     ready: `${clip.modes.length} modes`,
     failed: "failed",
+    stopped: "stopped",
   };
   return `${clip.name}, ${said[clip.phase]}`;
+}
+
+/** @param {Clip} clip @returns {string} share of what is done in its extraction; empty if it is not known */
+function percent(clip) {
+  return clip.progress === null ? "" : `, ${fixed(100 * clip.progress, 0)} %`;
 }
 
 /**
@@ -266,6 +293,9 @@ function sentence(clip) {
   if (!clip) return "It has no clip: choose a file, record one, or drop one onto the solid.";
   if (clip.phase === "failed") return clip.message ?? "Its clip could not be read.";
   if (clip.phase === "waiting") return "Its clip waits until another one has been listened to.";
-  if (clip.phase === "listening") return clip.message ?? "Its modes are being found \u2026";
+  if (clip.phase === "stopped") return `Its modes are not known: ${clip.message}.`;
+  if (clip.phase === "listening") {
+    return `Its modes are being found${clip.message ? `: ${clip.message}` : ""} \u2026`;
+  }
   return `${withSeconds(clip.seconds)} at ${clip.rate_hz} Hz, ${clip.modes.length} modes found.`;
 }

@@ -8,7 +8,7 @@ const SEEN = "carillon-studio-tour";
 const STEPS = [
   {
     place: "#view",
-    title: "Open a solid",
+    title: "I want to make sounds: open a solid",
     text:
       "Drop a mesh onto the page, choose one that comes along, or open an example. It is prepared by " +
       "itself. Drag beside it to turn it, and press anywhere on it to strike it, as hard as the strength " +

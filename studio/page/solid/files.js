@@ -1,5 +1,7 @@
 /** Files that come to the page: meshes and clips, dropped or chosen. */
 
+import { attempt, giveClip } from "../panels/chosen.js";
+
 /** @typedef {import("../main.js").Parts} Parts */
 
 /**
@@ -14,12 +16,14 @@ export const UNITS = [
   [0.0254, "inch"],
 ];
 
-const CLIPS = /\.(wav|wave|flac|ogg|oga|aif|aiff|mp3)$/i;
+/** Endings of clips, as the server takes them (`studio/server/uploads.py`). */
+export const CLIP_ENDINGS = [".wav", ".wave", ".flac", ".ogg", ".oga", ".aif", ".aiff", ".mp3"];
 const MESHES = /\.(obj|stl|ply|off|glb|gltf)$/i;
 
 /** @param {File} file @returns {"mesh" | "clip" | null} what it is taken for */
 export function kindOf(file) {
-  if (CLIPS.test(file.name) || file.type.startsWith("audio/")) return "clip";
+  const name = file.name.toLowerCase();
+  if (CLIP_ENDINGS.some((ending) => name.endsWith(ending)) || file.type.startsWith("audio/")) return "clip";
   if (MESHES.test(file.name) || file.type.startsWith("model/")) return "mesh";
   return null;
 }
@@ -43,26 +47,27 @@ export async function openMesh({ connection, say }, file, unit) {
 }
 
 /**
- * Sends a clip and gives it to a target: a new one at a vertex, or the selected one.
+ * Sends a clip and gives it to a target: the one at a vertex, a new one there, or the selected one.
  *
  * @param {Parts} parts
  * @param {File} file
- * @param {number | null} vertex of a new target
+ * @param {number | null} vertex where it was dropped on the solid
  * @returns {Promise<void>}
  */
-export async function takeClip({ connection, selection, say }, file, vertex) {
-  const target = selection.current.target;
-  if (vertex === null && target === null) {
+export async function takeClip(parts, file, vertex) {
+  const { connection, selection, state, say } = parts;
+  const there = state.current?.targets.find((target) => target.vertex === vertex);
+  const target = vertex === null ? selection.current.target : (there?.name ?? null);
+  if (target !== null) {
+    await giveClip(parts, target, file.name, file);
+  } else if (vertex === null) {
     say(`${file.name} needs a target: drop it on the solid, where it was struck.`, "error");
-    return;
-  }
-  try {
-    say(`Sending ${file.name}.`);
-    const clip = await connection.upload("clip", file.name, file);
-    if (vertex !== null) await connection.call("add_target", { vertex, clip });
-    else await connection.call("change_target", { target, clip });
-  } catch (error) {
-    say(/** @type {Error} */ (error).message, "error");
+  } else {
+    await attempt(parts, async () => {
+      say(`Sending ${file.name}.`);
+      const clip = await connection.upload("clip", file.name, file);
+      await connection.call("add_target", { vertex, clip });
+    });
   }
 }
 
@@ -94,7 +99,7 @@ export function acceptDrops(parts, solid, vertexAt, hover, openFile) {
   document.addEventListener("dragleave", (event) => {
     if (event.relatedTarget === null) end();
   });
-  document.addEventListener("drop", (event) => {
+  document.addEventListener("drop", async (event) => {
     if (!carriesFiles(event)) return;
     event.preventDefault(); // or the browser would leave the page for the file
     const vertex = under(event);
@@ -103,7 +108,7 @@ export function acceptDrops(parts, solid, vertexAt, hover, openFile) {
     for (const file of files) {
       const kind = kindOf(file);
       if (kind === "mesh") openFile(file);
-      else if (kind === "clip") takeClip(parts, file, vertex);
+      else if (kind === "clip") await takeClip(parts, file, vertex);
       else parts.say(`${file.name}: expected a mesh (obj, stl, ply, ...) or a clip (wav, flac, ...).`, "error");
     }
   });

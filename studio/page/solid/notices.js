@@ -23,9 +23,9 @@ export function makeNotices(element, parts, silent) {
   element.className = "notices";
   element.innerHTML = `
     <div class="empty" hidden>
-      <h2>Design what a solid sounds like</h2>
-      <p>Open a solid, strike it anywhere and hear it. Put clips where they were struck, press optimise,
-        and its material comes to sound like them.</p>
+      <h2>I want to make sounds</h2>
+      <p>Open an example or a solid of your own, and press anywhere on it: it sounds. To make it sound like a
+        recording, give that to the point that was struck, and press <em>Optimise</em>.</p>
       <div class="chooser"></div>
     </div>
     <div class="notice progress" hidden>

@@ -1,0 +1,47 @@
+"""Figures have one unit on the command line and on the studio's page."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sound.__main__ import main
+from sound.clips.wav import write_wav
+from sound.commands.design import _sentences, summarise
+from sound.project.design import MaterialDamping
+from sound.synthesis.sinusoids import damped_sinusoids
+from tests.small_design import small_design
+
+RATE, DAMPING = 8000, 9.0
+
+
+def test_errors_of_frequencies_are_in_cents():
+    costs = {"cost_start": 2.0, "cost": 1.0, "frequency_cost": 0.6, "amplitude_cost": 0.4}
+    effort = {"seconds": 1.0, "evaluations": 9, "evaluations_per_minute": 540.0, "workers": 1}
+    others = {"method": "hybrid", "checks": [], "residual_max": 1e-9}
+    made = small_design()
+    design = replace(
+        made,
+        evidence=costs | effort | others,
+        settings={"material": {"young_bounds": None}},
+        damping=MaterialDamping(None, 0.0, made.targets.dampings),
+    )
+    summary = summarise(design)
+    off = 1200.0 * np.abs(np.log2(design.frequencies / design.targets.frequencies))
+    assert summary["frequency_error_median_cents"] == pytest.approx(np.median(off))
+    assert summary["frequency_error_max_cents"] == pytest.approx(off.max())
+    said = _sentences(Path("design.h5"), design, summary)
+    assert f"median error {np.median(off):.1f} cents, worst {off.max():.1f} cents" in said
+
+
+def test_a_damping_stands_beside_the_time_of_60_decibels(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("CARILLON_CACHE", str(tmp_path / "cache"))
+    values = np.array([[440.0], [DAMPING], [0.5], [0.0]])
+    write_wav(tmp_path / "clip.wav", damped_sinusoids(*values, RATE, RATE // 2), RATE)
+    assert main(["extract", str(tmp_path / "clip.wav")]) == 0
+    line, head, row = capsys.readouterr().out.splitlines()
+    assert "% of the energy" in line
+    assert head.split()[:6] == ["Hz", "1/s", "60", "dB", "in", "s"]
+    assert float(row.split()[2]) == pytest.approx(math.log(1000.0) / DAMPING, abs=1e-3)
