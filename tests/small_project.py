@@ -21,6 +21,7 @@ PROJECT = {
         {"name": "side", "at": [0.04, 0.0225, 0.02], "clip": "side.wav"},
     ],
     "material": {"dimensions": 10},
+    "weights": {"frequency": 1.0, "amplitude": 10.0},
     "optimiser": {"seconds": None, "evaluations": 120, "workers": 1},
 }
 

@@ -94,11 +94,13 @@ def test_a_design_is_made_of_it_as_it_is(here):
 def test_a_design_of_a_number_of_modes_is_gone_on_from_with_all(here):
     text = written(here / "bar.yaml", "--clips", "wood.wav")
     Path("three.yaml").write_text(text.replace("#modes: auto", "modes: 3"))
-    for name, count in {"three": 3, "bar": 5}.items():
+    for name in ("three", "bar"):
         words = ["design", f"{name}.yaml", "--evaluations", "1", "--workers", "1"]
         assert main([*words, "--out", "bar.h5"]) == 0
         design = read_design("bar.h5")
-        assert design.settings["modes"] == len(design.frequencies) == count
+        assert design.settings["modes"] == len(design.frequencies)
+        assert len(design.frequencies) == 3 or name == "bar"
+    assert len(design.targets.sounding) + len(design.targets.left_out) == 5
     assert design.history["evaluations"].tolist()[-1] == 2
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from carillon.errors import UserError
 from sound.__main__ import main
+from sound.clips import audibility
+from sound.clips.audibility import erb_number, heard_partials
 from sound.clips.extraction import ModalSound
 from sound.clips.targets import APART, MOST_MODES, share_frequencies
 from sound.clips.wav import read_wav, write_wav
@@ -90,36 +92,66 @@ def test_more_modes_than_all_clips_have_cannot_be_asked_for():
         share_frequencies(["a", "b"], sounds, 3)
 
 
-def test_modes_that_nobody_hears_do_not_count():
-    loud = sound([200.0, 1000.0, 1500.0], [1.0, 9e-4, 2e-3])
+def test_partials_that_nobody_hears_do_not_count():
+    loud = sound([200.0, 1000.0, 1500.0], [1.0, 2e-3, 0.2])
     targets = share_frequencies(["loud"], [loud], "auto")
     np.testing.assert_allclose(targets.frequencies, [200.0, 1500.0])
     quiet = sound([300.0, 1000.0], [1e-4, 1e-4])
     targets = share_frequencies(["loud", "quiet"], [loud, quiet], "auto")
     np.testing.assert_allclose(targets.frequencies, [200.0, 300.0, 1000.0, 1500.0])
-    np.testing.assert_array_equal(targets.amplitudes[:, 2], [9e-4, 1e-4])
+    np.testing.assert_array_equal(targets.amplitudes[:, 2], [0.0, 1e-4])
 
 
-def test_modes_too_close_for_a_design_count_once():
+def test_partials_of_several_clips_too_close_for_a_design_count_once():
     assert APART == RESOLVED
-    beating = sound([200.0, 1000.0, 1002.9, 1006.0], [1.0, 0.5, 0.6, 0.3])
-    targets = share_frequencies(["one"], [beating], "auto")
-    np.testing.assert_allclose(targets.frequencies, [200.0, 1002.9, 1006.0])
-    np.testing.assert_array_equal(targets.amplitudes, [[1.0, 0.6, 0.3]])
-    targets = share_frequencies("ab", [beating, sound([600.0, 1005.4], [0.5, 0.4])], "auto")
-    assert (targets.amplitudes[1] > 0.0).sum() == 2
+    one, other = sound([200.0, 1000.0], [1.0, 0.6]), sound([600.0, 1002.5], [0.5, 0.4])
+    targets = share_frequencies("ab", [one, other], "auto")
+    assert len(targets.frequencies) == 3
+    assert (targets.amplitudes > 0.0).sum(axis=1).tolist() == [2, 2]
 
 
-def test_a_design_takes_the_strongest_modes_of_a_rich_clip():
+def test_twins_are_one_partial_and_bursts_are_none():
+    hertz = [1401.06, 1401.90, 2043.0, 2046.0, 2049.0, 2521.0, 600.0]
+    dampings = np.array([5.0, 6.0, 9.0, 9.0, 9.0, 1900.0, 250.0])
+    order = np.argsort(hertz)
+    clip = sound(sorted(hertz), [1.0] * len(hertz))
+    clip = replace(clip, dampings=dampings[order], residual=np.zeros(RATE // 4))
+    targets = share_frequencies(["one"], [clip], "auto")
+    assert len(targets.frequencies) == 2
+    assert 1401.0 < targets.frequencies[0] < 1402.0 and 2043.0 <= targets.frequencies[1] <= 2049.0
+
+
+def test_a_partial_in_place_of_several_has_their_energy():
+    clip = sound([1000.0, 1004.0, 1011.0], [1.0, 0.8, 0.5], damping=12.0)
+    clip = replace(clip, phases=np.array([0.3, 1.1, -2.0]), residual=np.zeros(4 * RATE))
+    one = heard_partials(clip)
+    energies = [float(each.modal_part() @ each.modal_part()) for each in (clip, one)]
+    assert len(one.frequencies) == 1 and energies[1] == pytest.approx(energies[0], rel=1e-2)
+
+
+def test_bursts_are_in_the_rest_and_loudness_does_not_depend_on_the_level():
+    clip = sound([500.0, 2500.0], [1.0, 1.0])
+    clip = replace(clip, dampings=np.array([8.0, 2000.0]), residual=np.zeros(RATE))
+    heard = heard_partials(clip)
+    np.testing.assert_allclose(
+        heard.modal_part() + heard.residual, clip.modal_part() + clip.residual, atol=1e-12
+    )
+    quiet = heard_partials(replace(clip, amplitudes=1e-3 * clip.amplitudes))
+    np.testing.assert_array_equal(quiet.frequencies, heard.frequencies)
+
+
+def test_a_design_takes_partials_of_a_rich_clip_that_the_ear_tells_apart():
     rich = sound([100.0 * n for n in range(1, 41)], [1.0 / n for n in range(1, 41)])
     targets = share_frequencies(["rich"], [rich], "auto")
-    np.testing.assert_allclose(targets.frequencies, rich.frequencies[:MOST_MODES])
+    assert 15 < len(targets.frequencies) <= MOST_MODES
+    assert (np.diff(erb_number(targets.frequencies)) >= audibility.RESOLVED).all()
+    np.testing.assert_allclose(targets.frequencies[:8], rich.frequencies[:8])
+    assert targets.shares.sum() == pytest.approx(1.0)
 
 
-def test_clips_of_one_mode_are_no_design():
+def test_a_clip_of_one_partial_is_a_design():
     beating = sound([1000.0, 1001.0], [1.0, 1.0])
-    with pytest.raises(UserError, match=r"the clips \(one\) have 1 mode in all .* needs 2"):
-        share_frequencies(["one"], [beating], "auto")
+    assert len(share_frequencies(["one"], [beating], "auto").frequencies) == 1
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +170,7 @@ def test_extract_command_prints_a_table_and_writes_json(clips, tmp_path, capsys)
     assert main(["extract", *paths, "--out", str(out)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith(f"{paths[0]}: strike at 0.0")
-    assert lines[2].split() == ["Hz", "1/s", "a", "b"]
+    assert lines[2].split() == ["Hz", "1/s", *"60 dB in s".split(), "a", "b"]
     assert [float(line.split()[0]) for line in lines[3:]] == [300.0, 800.0, 1900.0]
     content = json.loads(out.read_text())
     assert content["names"] == ["a", "b"]
