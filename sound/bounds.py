@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from carillon.errors import UserError
+from carillon.parameters import Check
 from carillon.parameters.quantities import between
 
 LOWEST_RATE, HIGHEST_RATE = 1_000, 768_000
@@ -27,6 +28,21 @@ SampleRate = Annotated[int, between(LOWEST_RATE, HIGHEST_RATE)]
 """Samples per second [Hz]."""
 ContactSeconds = Annotated[float, between(0.0, LONGEST_CONTACT)]
 """Duration of a strike's force [s]; 0 is an impulse."""
+
+
+FLOAT_BITS = 32
+"""Bits of a sample that is a floating-point number."""
+WHOLE_BITS = (16, 24)
+"""Bits of samples that are whole numbers."""
+
+
+def _bits(value: int) -> int:
+    if value not in (*WHOLE_BITS, FLOAT_BITS):
+        raise ValueError(f"found {value}, expected 16, 24 or 32")
+    return value
+
+
+SampleBits = Annotated[int, Check(_bits)]
 
 
 def require_level(peak: float) -> None:

@@ -16,14 +16,19 @@ LOWEST_METER_RATE = 8_000
 """Least sampling rate [Hz] at which the filter of BS.1770 is itself, within 0.25 dB."""
 END_DBFS = -60.0
 """Greatest level [dBFS] at which a sound ends without a fade."""
+DECAY_NEPERS = np.log(1e3)
+"""Decay by 60 dB [nepers]."""
 END_SECONDS = 0.1
 """Length of the end whose level is told [s]."""
 FADE_SHARE, LONGEST_FADE = 0.1, 0.5
 """Length of a fade over that of the sound, and its greatest length [s]."""
-LIMITED_DECIBELS = 6.0
-"""Greatest attenuation of single peaks [dB]; what is louder still is fainter as a whole."""
-LOOK_SECONDS = 0.01
+LOOK_SECONDS = 0.005
 """Time before and after a peak in which it is attenuated [s]."""
+LIMITED_DECIBELS = 36.0
+"""Greatest attenuation of peaks of a sound that stays as loud [dB]."""
+LOUDNESS_TOLERANCE, LOUDNESS_ROUNDS = 0.1, 12
+"""Greatest difference [LU] of a sound whose peaks are attenuated from what it was, and greatest
+number of attempts."""
 
 
 def decibels(magnitude: float) -> float:
@@ -133,6 +138,35 @@ def limiting_gains(samples: Array, rate: int) -> Array:
     smooth = uniform_filter1d(uniform_filter1d(least, size, mode="nearest"), size, mode="nearest")
     # Running sums round.
     return np.asarray(np.minimum(smooth, needed))
+
+
+def limited(samples: Array, rate: int, seconds: float | None = None) -> tuple[float, Array]:
+    """A factor, and gains (s,), that keep samples (s,) within `FULL` and as loud as they are.
+
+    Peaks that are attenuated take loudness away, which the factor gives back, as far as
+    `LIMITED_DECIBELS` allow.  Loudness is that of the first `seconds`, or of all.
+
+    Examples
+    --------
+    >>> tone = np.exp(-np.arange(8000) / 800) * np.sin(np.arange(8000))
+    >>> factor, gains = limited(3.0 * tone, 8000)
+    >>> factor > 1.0, round(float(np.abs(factor * gains * 3.0 * tone).max()), 2)
+    (True, 0.99)
+    """
+    peak = float(np.abs(samples).max(initial=0.0))
+    if peak <= FULL:
+        return 1.0, np.ones(len(samples))
+    first = len(samples) if seconds is None else max(1, round(seconds * rate))
+    most = FULL * 10.0 ** (LIMITED_DECIBELS / 20.0) / peak
+    factor, asked = min(1.0, most), relative_loudness(samples[:first], rate)
+    gains = limiting_gains(factor * samples, rate)
+    for _ in range(LOUDNESS_ROUNDS):
+        lost = asked - relative_loudness((factor * gains * samples)[:first], rate)
+        if lost <= LOUDNESS_TOLERANCE or factor >= most:
+            break
+        factor = min(most, factor * 10.0 ** (lost / 20.0))
+        gains = limiting_gains(factor * samples, rate)
+    return factor, gains
 
 
 def dithered(samples: Array, bits: int, seed: int = 0) -> NDArray[np.int32]:

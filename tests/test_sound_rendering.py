@@ -20,7 +20,8 @@ from sound.__main__ import main
 from sound.clips.noise import noise_part
 from sound.clips.wav import PEAK
 from sound.project.design_file import write_design
-from sound.rendering.listening import Listening, resampled
+from sound.rendering.clip_level import resampled
+from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.sinusoids import Bank, ring

@@ -25,6 +25,7 @@ from sound.clips.free_vibration import SHORTEST_SAMPLES, free_modes, is_clipped,
 from sound.clips.glide import glide
 from sound.clips.mode_search import FEWEST_PERIODS, has_periods, is_mode
 from sound.clips.significance import Fit
+from sound.levels import relative_loudness
 from sound.synthesis.sinusoids import damped_sinusoids, superposed
 
 LONGEST_SECONDS = 6.0
@@ -103,7 +104,8 @@ def extract(
     _require_sound(clip)
     strike = strike_sample(clip)
     second = second_strike(clip[strike:], rate)
-    clip = clip[strike:][:second]
+    whole = clip[strike:]
+    clip = whole[:second]
     clip = clip[: ending(clip, rate)].copy()
     if len(clip) < SHORTEST_SAMPLES:
         raise UserError(
@@ -132,6 +134,8 @@ def extract(
         end_seconds=(strike + len(clip)) / rate,
         second_strike_seconds=None if second is None else (strike + second) / rate,
         glide=None if bend is None else asdict(bend),
+        loudness_lufs=relative_loudness(whole, rate),
+        loudness_seconds=len(whole) / rate,
     )
     return sound
 

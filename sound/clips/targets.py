@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from carillon.arrays import Array
 from carillon.errors import UserError
 from sound.clips.extraction import ModalSound
+from sound.clips.noise import noise_part
+from sound.levels import faded
 
 SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
 """Greatest distance of modes of different clips that count as one, in Hz or as a share, whichever
@@ -26,12 +29,25 @@ FEWEST_MODES, MOST_MODES = 2, 30
 
 
 @dataclass(frozen=True)
+class ClipLoudness:
+    """Integrated loudness `lufs` (T,) [LUFS] of clips over `seconds` (T,), from strike to end.
+
+    It includes strikes that are left out and fade-outs, and does without the absolute gate of ITU-R
+    BS.1770, see `sound.levels.relative_loudness`.
+    """
+
+    lufs: Array
+    seconds: Array
+
+
+@dataclass(frozen=True)
 class Targets:
     """Modes that a design should have at T struck points of some names.
 
     Ascending frequencies (N,) [Hz] and dampings (N,) [1/s] are shared by all points; amplitudes (T,
     N) are those at the strike, 0 where the clip of a point lacks a mode.  `residuals` are T arrays
-    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.
+    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.  The `loudness` of the
+    clips is None if it is not known.
     """
 
     names: tuple[str, ...]
@@ -40,6 +56,16 @@ class Targets:
     amplitudes: Array
     residuals: tuple[Array, ...]
     rates: tuple[int, ...]
+    loudness: ClipLoudness | None = None
+
+    @cached_property
+    def noises(self) -> tuple[tuple[Array, float], ...]:
+        """Noise (s,) of each residual, which fades where it is cut off, and the share of the
+        residual's energy in tones, which is left out; see `sound.clips.noise`."""
+        parts = [noise_part(rest, rate) for rest, rate in zip(self.residuals, self.rates)]
+        return tuple(
+            (faded(noise, rate)[0], share) for (noise, share), rate in zip(parts, self.rates)
+        )
 
 
 def share_frequencies(
@@ -98,7 +124,20 @@ def share_frequencies(
         amplitudes=table[:, chosen],
         residuals=tuple(sound.residual for sound in sounds),
         rates=tuple(sound.rate for sound in sounds),
+        loudness=_loudness(sounds),
     )
+
+
+def _loudness(sounds: Sequence[ModalSound]) -> ClipLoudness | None:
+    """Loudness of the clips that sounds come from; None if one comes from no clip."""
+    try:
+        rows = [
+            (each.evidence["loudness_lufs"], each.evidence["loudness_seconds"]) for each in sounds
+        ]
+    except KeyError:
+        return None
+    lufs, seconds = np.array(rows, dtype=float).T
+    return ClipLoudness(lufs, seconds)
 
 
 def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:

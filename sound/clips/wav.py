@@ -11,6 +11,7 @@ from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import cause, require_file
 from sound.bounds import (
+    FLOAT_BITS,
     HIGHEST_RATE,
     LOWEST_RATE,
     MOST_CHANNELS,
@@ -25,10 +26,6 @@ ENDINGS = (".wav",)
 """Endings of the names of sound files that are written."""
 PEAK = 0.89
 """Peak magnitude of a normalised sound: 1 dB below full scale."""
-FLOAT_BITS = 32
-"""Bits of a sample that is a floating-point number."""
-WHOLE_BITS = (16, 24)
-"""Bits of samples that are whole numbers."""
 UNKNOWN = 0x7FFF_F000
 """Least length of a chunk that stands for an unknown one: programs that write to a pipe cannot fill
 in the length later."""

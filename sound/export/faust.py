@@ -16,9 +16,9 @@ import numpy as np
 from carillon import __version__
 from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
+from sound.levels import DECAY_NEPERS
 from sound.project.design import Design
 from sound.rendering.listening import Listening
-from sound.rendering.render import DECAY_NEPERS
 from sound.rendering.solid import SoundingSolid
 
 LEAST_DAMPING = 1e-3

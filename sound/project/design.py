@@ -175,6 +175,11 @@ def fault(design: Design) -> str:
             ("fine frequencies", design.fine.hertz, (N,)),
             ("order of fine modes", design.fine.order, (N,)),
         ]
+    if targets.loudness is not None:
+        expected += [
+            ("loudness of clips", targets.loudness.lufs, (T,)),
+            ("lengths of clips", targets.loudness.seconds, (T,)),
+        ]
     if design.damping is not None:
         expected.append(("dampings of the material", design.damping.dampings, (N,)))
         if design.damping.loss_factors is not None:

@@ -1,13 +1,13 @@
 """A design in other forms, for other tools."""
 
 from carillon.errors import UserError
-from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import write_wav
 from sound.export.formats import export_design
 from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
-from sound.rendering.render import Hit, render, ringing_seconds
+from sound.rendering.render import Hit
+from sound.rendering.rendered_sound import render_sound
 from sound.rendering.solid import SoundingSolid
 
 
@@ -38,5 +38,5 @@ def _write_strike(design: Design, target: str | None, out: str) -> None:
     solid = SoundingSolid.of_design(design)
     hit = Hit(0.0, strike.position, strike.inward)
     listening = Listening.of_design(design, solid)
-    sound = render(solid, [hit], ringing_seconds(solid), listening=listening)
-    write_wav(out, sound, SAMPLE_RATE_HERTZ)
+    sound = render_sound(solid, [hit], listening=listening)
+    write_wav(out, sound.samples, sound.rate)
