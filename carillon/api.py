@@ -710,11 +710,11 @@ def render(
 ) -> Array:
     """Samples (s,) of the sound of one strike or of many, whose full scale is 1.
 
-    A strike of 1 N s at a target of a design is as loud as its clip (ITU-R BS.1770); peaks beyond
-    full scale are attenuated by 6 dB at most, and the whole by what is left.  Samples of a solution
-    are scaled to a peak of 1 dB below full scale.  An end above -60 dBFS fades, over a tenth of the
-    sound, 0.5 s at most.  Raises UserError for values that are out of range, if a point is far from the surface or a
-    target unknown, or if nothing sounds.
+    A strike of 1 N s at a target of a design is as loud as its clip (ITU-R BS.1770).  Strikes that
+    are stronger are scaled where they are beyond full scale, and peaks of others are attenuated.
+    Samples of a solution are scaled to a peak of 1 dB below full scale.  An end above -60 dBFS
+    fades, over a tenth of the sound, 0.5 s at most.  Raises UserError for values that are out of
+    range, if a point is far from the surface or a target unknown, or if nothing sounds.
 
     Parameters
     ----------

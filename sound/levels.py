@@ -189,7 +189,7 @@ def dithered(samples: Array, bits: int, seed: int = 0) -> NDArray[np.int32]:
 
 
 @dataclass(frozen=True)
-class Level:
+class SoundLevel:
     """Level of a sound that is written."""
 
     loudness_lufs: float | None
@@ -202,7 +202,7 @@ class Level:
     """s: length of the fade at the end, 0 for none."""
 
     @classmethod
-    def of(cls, samples: Array, rate: int, end: float, fade_seconds: float = 0.0) -> "Level":
+    def of(cls, samples: Array, rate: int, end: float, fade_seconds: float = 0.0) -> "SoundLevel":
         """The level of samples (s,) or (s, c) at a rate [Hz] that end at `end` [dBFS], and fade."""
         peak = decibels(float(np.abs(samples).max(initial=0.0)))
         loudness = loudness_lufs(samples, rate)
@@ -217,9 +217,9 @@ class Level:
 
         Examples
         --------
-        >>> Level(-18.44, -1.02, -21.3, 0.5).in_words()
+        >>> SoundLevel(-18.44, -1.02, -21.3, 0.5).in_words()
         '-18.4 LUFS, peak -1.0 dBFS, ends at -21.3 dBFS with a fade of 0.5 s'
-        >>> Level(None, None, None, 0.0).in_words()
+        >>> SoundLevel(None, None, None, 0.0).in_words()
         'silent'
         """
         if self.peak_dbfs is None:

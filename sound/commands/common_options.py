@@ -1,8 +1,7 @@
 """Options that several commands have in common."""
 
 from carillon.parameters import option, parameters
-from carillon.parameters.quantities import Count, Positive, Seed, Workers
-from sound.bounds import FLOAT_BITS, SampleBits
+from carillon.parameters.quantities import Count, Positive, Workers
 from sound.project.settings import Dampings, OptimiserMethod
 
 
@@ -27,16 +26,3 @@ class DampingOptions:
         "dampings of the clips, or those that loss factors of the material make, not as the "
         "project says",
     )
-
-
-@parameters
-class WavOptions:
-    """Samples of a sound file that is written."""
-
-    bits: SampleBits = option(
-        FLOAT_BITS,
-        "bits of a sample: 32 is a floating-point number, 16 and 24 are whole numbers with dither "
-        "(default 32)",
-        metavar="{16,24,32}",
-    )
-    dither_seed: Seed = option(0, "random numbers of the dither")

@@ -20,7 +20,8 @@ from sound.bounds import (
     SampleRate,
     require_length,
 )
-from sound.commands.common_options import DampingOptions, WavOptions
+from sound.commands.common_options import DampingOptions
+from sound.outputs import WavOptions
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.rendering.heard_solid import HeardSolid
@@ -259,11 +260,11 @@ def _beside_clip(listening: Listening, hit: Hit, sound: RenderedSound) -> dict[s
 
 
 def _sentence(summary: dict[str, Any]) -> str:
-    from sound.levels import Level, decibels
+    from sound.levels import SoundLevel, decibels
 
     hertz = summary["frequencies_hz"]
     span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
-    level = Level(*(summary[each.name] for each in fields(Level)))
+    level = SoundLevel(*(summary[each.name] for each in fields(SoundLevel)))
     text = f"{summary['out']}: {len(hertz)} modes{span}, {summary['seconds']:.3g} s, "
     text += level.in_words()
     if summary["cut_off"]:

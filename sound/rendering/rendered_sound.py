@@ -16,7 +16,7 @@ from sound.levels import (
     END_DBFS,
     END_SECONDS,
     FULL,
-    Level,
+    SoundLevel,
     decibels,
     end_dbfs,
     faded,
@@ -58,7 +58,7 @@ class RenderedSound:
     modes: Array
     noise: Array
     rate: int
-    level: Level
+    level: SoundLevel
     scale: float
     """float: factor by which all samples were scaled."""
     limited_decibels: float
@@ -120,7 +120,7 @@ def render_sound(
     samples, fade = faded(modes + noise, rate, fade)
     if fade:
         modes, noise = (faded(each, rate, fade)[0] for each in (modes, noise))
-    level = Level.of(samples, rate, end, fade)
+    level = SoundLevel.of(samples, rate, end, fade)
     attenuation = decibels(1.0 / float(gains.min(initial=1.0)))
     return RenderedSound(modes, noise, rate, level, scale, attenuation, cut_off)
 
