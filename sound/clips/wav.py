@@ -75,7 +75,7 @@ def write_wav(
         samples, largest = samples * (PEAK / largest), PEAK
     if largest > 1.0 and bits != FLOAT_BITS:
         raise UserError(
-            f"{path}: not written, the sound reaches {largest:.3g} times full scale, more than "
+            f"{path}: not written, the sound reaches {largest:.4g} times full scale, more than "
             f"whole numbers of {bits} bits hold; write {FLOAT_BITS} bits, or a fainter sound"
         )
     if largest > np.finfo(np.float32).max:

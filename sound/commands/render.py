@@ -248,10 +248,19 @@ def _summary(
 
 
 def _beside_clip(listening: Listening, hit: Hit, sound: RenderedSound) -> dict[str, float]:
-    """Loudness of the clip of a struck target, and of the sound over as long; none elsewhere."""
+    """Loudness of the clip of a struck target, and of the sound over as long; none elsewhere.
+
+    Nor is there any of a sound that is cut short or silent.
+    """
+    from sound.levels import END_DBFS
+
     loudness, weights = listening.targets.loudness, listening.weights(hit.position)
     target = int(weights.argmax())
     if loudness is None or weights[target] < 1.0 or not sound.samples.any():
+        return {}
+    is_short = len(sound.samples) < round(loudness.seconds[target] * sound.rate)
+    end = sound.level.end_dbfs
+    if is_short and end is not None and end > END_DBFS:
         return {}
     return {
         "clip_loudness_lufs": float(loudness.lufs[target]),
@@ -272,7 +281,7 @@ def _sentence(summary: dict[str, Any]) -> str:
     if summary["scale"] != 1.0:
         text += f"; scaled by {summary['scale']:.4g} ({decibels(summary['scale']):+.1f} dB)"
     if summary["limited_decibels"]:
-        text += f"; peaks are held within full scale, {summary['limited_decibels']:.1f} dB at most"
+        text += f"; peaks are attenuated by up to {summary['limited_decibels']:.1f} dB"
     if summary["clip_loudness_lufs"] is not None:
         text += (
             f"; over the length of its clip {summary['loudness_over_clip_lufs']:.1f} LUFS, "

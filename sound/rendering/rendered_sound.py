@@ -21,6 +21,7 @@ from sound.levels import (
     end_dbfs,
     faded,
     limited,
+    limiting_gains,
     relative_loudness,
 )
 from sound.rendering.listening import Listening
@@ -102,7 +103,7 @@ def render_sound(
     else:
         modes, noise = parts(seconds)
     has_level = listening is not None and not options.normalise
-    peak = float(np.abs(modes + noise).max(initial=0.0))
+    peak = float(np.maximum(np.abs(modes + noise), np.abs(modes)).max(initial=0.0))
     strongest = max(float(np.linalg.norm(hit.impulse)) for hit in hits)
     scale = _scale(peak, strongest, options, has_level)
     gains = np.ones(len(modes))
@@ -110,6 +111,8 @@ def render_sound(
         like = listening.clip_seconds(hits[0].position) if listening and len(hits) == 1 else None
         factor, gains = limited(scale * (modes + noise), rate, like)
         scale *= factor
+        # Modes may be written by themselves, just as loud.
+        gains = gains * limiting_gains(scale * gains * modes, rate)
     modes, noise, cut_off = scale * gains * modes, scale * gains * noise, False
     if seconds is None:
         stop = _end(modes + noise, rate, 1.0 if has_level else np.inf)
