@@ -40,11 +40,11 @@ class LevelOptions:
     """What is done to the level of a sound.
 
     `raw` samples stay as they are computed.  Otherwise those of a design's modes, which are as loud
-    as its clips, are kept within full scale: strikes of more than 1 N s are fainter, as faint as if
-    the strongest had 1 N s if need be, and peaks that are still beyond are attenuated, see
-    `sound.levels.limited`.  Those of other modes are scaled to `sound.clips.wav.PEAK`.
-    With `normalise` either are scaled to full scale.  The end has a fade of `fade_seconds`; by
-    default as long as `sound.levels.faded` says, and none if raw.
+    as its clips, are kept within full scale: sounds with strikes of more than 1 N s are scaled, at
+    most as if the strongest had 1 N s, and peaks that are still beyond are attenuated, see
+    `sound.levels.limited`.  Those of other modes are scaled to `sound.clips.wav.PEAK`.  With
+    `normalise` either are scaled to full scale.  The end has a fade of `fade_seconds`; by default
+    as long as `sound.levels.faded` says, and none if raw.
     """
 
     raw: bool = False
@@ -158,9 +158,9 @@ def _end(samples: Array, rate: int, full: float, share: float = 1.0) -> int:
 
 
 def _ringing_seconds(solid: SoundingSolid) -> float:
-    """Time until the slowest mode has decayed by 60 dB [s], at most `LONGEST_SECONDS`."""
-    slowest = float(solid.dampings.min())
-    return min(LONGEST_SECONDS, DECAY_NEPERS / slowest) if slowest > 0.0 else LONGEST_SECONDS
+    """Time until the slowest mode has decayed by 60 dB and `MARGIN` [s], or `LONGEST_SECONDS`."""
+    slowest, decay = float(solid.dampings.min()), DECAY_NEPERS - np.log(MARGIN)
+    return min(LONGEST_SECONDS, decay / slowest) if slowest > 0.0 else LONGEST_SECONDS
 
 
 def _scale(peak: float, strongest: float, options: LevelOptions, has_level: bool) -> float:
