@@ -140,11 +140,14 @@ def limiting_gains(samples: Array, rate: int) -> Array:
     return np.asarray(np.minimum(smooth, needed))
 
 
-def limited(samples: Array, rate: int, seconds: float | None = None) -> tuple[float, Array]:
+def limited(
+    samples: Array, rate: int, seconds: float | None = None, beside: Array | None = None
+) -> tuple[float, Array]:
     """A factor, and gains (s,), that keep samples (s,) within `FULL` and as loud as they are.
 
     Peaks that are attenuated take loudness away, which the factor gives back, as far as
-    `LIMITED_DECIBELS` allow.  Loudness is that of the first `seconds`, or of all.
+    `LIMITED_DECIBELS` allow.  Loudness is that of the first `seconds`, or of all.  Samples `beside`
+    (s,) are kept within `FULL`, too.
 
     Examples
     --------
@@ -153,19 +156,20 @@ def limited(samples: Array, rate: int, seconds: float | None = None) -> tuple[fl
     >>> factor > 1.0, round(float(np.abs(factor * gains * 3.0 * tone).max()), 2)
     (True, 0.99)
     """
-    peak = float(np.abs(samples).max(initial=0.0))
+    held = np.stack([samples, samples if beside is None else beside], axis=1)
+    peak = float(np.abs(held).max(initial=0.0))
     if peak <= FULL:
         return 1.0, np.ones(len(samples))
     first = len(samples) if seconds is None else max(1, round(seconds * rate))
     most = FULL * 10.0 ** (LIMITED_DECIBELS / 20.0) / peak
     factor, asked = min(1.0, most), relative_loudness(samples[:first], rate)
-    gains = limiting_gains(factor * samples, rate)
+    gains = limiting_gains(factor * held, rate)
     for _ in range(LOUDNESS_ROUNDS):
         lost = asked - relative_loudness((factor * gains * samples)[:first], rate)
         if lost <= LOUDNESS_TOLERANCE or factor >= most:
             break
         factor = min(most, factor * 10.0 ** (lost / 20.0))
-        gains = limiting_gains(factor * samples, rate)
+        gains = limiting_gains(factor * held, rate)
     return factor, gains
 
 
@@ -173,8 +177,9 @@ def dithered(samples: Array, bits: int, seed: int = 0) -> NDArray[np.int32]:
     """Whole numbers of `bits` bits for samples (s,) or (s, c) of full scale 1, with dither.
 
     The dither is the sum of two uniform random numbers of a step each, of triangular distribution
-    (TPDF), so that the error is noise whose power does not depend on the sound.  The same `seed`
-    makes the same numbers.  Samples beyond full scale are clipped.
+    (TPDF), so that the error is noise whose power does not depend on the sound.  Samples that are 0
+    stay so: silence is silent.  The same `seed` makes the same numbers.  Samples beyond full scale
+    are clipped.
 
     Examples
     --------
@@ -185,6 +190,7 @@ def dithered(samples: Array, bits: int, seed: int = 0) -> NDArray[np.int32]:
     random = np.random.default_rng(seed)
     most = float(1 << (bits - 1))
     noise = random.random(np.shape(samples)) - random.random(np.shape(samples))
+    noise[samples == 0.0] = 0.0
     return np.clip(np.rint(most * samples + noise), -most, most - 1.0).astype(np.int32)
 
 

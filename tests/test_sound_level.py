@@ -107,6 +107,7 @@ def test_dither_makes_errors_that_do_not_depend_on_the_sound(tmp_path, bits):
         assert errors.mean() == pytest.approx(0.0, abs=0.01)
         assert errors.var() == pytest.approx(0.25, rel=0.03)
         assert abs(np.corrcoef(errors, samples)[0, 1]) < 0.01
+    assert not dithered(np.zeros(RATE), bits, 5).any()
     write_wav(tmp_path / "out.wav", samples, RATE, bits=bits, seed=5)
     assert soundfile.info(tmp_path / "out.wav").subtype == f"PCM_{bits}"
     np.testing.assert_array_equal(

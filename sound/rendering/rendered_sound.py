@@ -21,7 +21,6 @@ from sound.levels import (
     end_dbfs,
     faded,
     limited,
-    limiting_gains,
     relative_loudness,
 )
 from sound.rendering.listening import Listening
@@ -109,10 +108,9 @@ def render_sound(
     gains = np.ones(len(modes))
     if not options.raw:
         like = listening.clip_seconds(hits[0].position) if listening and len(hits) == 1 else None
-        factor, gains = limited(scale * (modes + noise), rate, like)
-        scale *= factor
         # Modes may be written by themselves, just as loud.
-        gains = gains * limiting_gains(scale * gains * modes, rate)
+        factor, gains = limited(scale * (modes + noise), rate, like, scale * modes)
+        scale *= factor
     modes, noise, cut_off = scale * gains * modes, scale * gains * noise, False
     if seconds is None:
         stop = _end(modes + noise, rate, 1.0 if has_level else np.inf)
