@@ -137,7 +137,7 @@ def limiting_gains(samples: Array, rate: int) -> Array:
     least = minimum_filter1d(needed, 2 * size - 1, mode="nearest")
     smooth = uniform_filter1d(uniform_filter1d(least, size, mode="nearest"), size, mode="nearest")
     # Running sums round.
-    return np.asarray(np.minimum(smooth, needed))
+    return np.where(smooth > 1.0 - 1e-12, 1.0, np.minimum(smooth, needed))
 
 
 def limited(
