@@ -17,6 +17,8 @@ MOST_SAMPLES = 1 << 26
 memory."""
 LONGEST_SOUND = 600.0
 """Greatest length [s] of a rendered sound."""
+LONGEST_COMPARED = 30.0
+"""Greatest length [s] of the part of a clip that a strike is as loud as."""
 LONGEST_CONTACT = 1.0
 """Greatest duration of a strike's force [s]."""
 LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6

@@ -10,7 +10,7 @@ import soundfile
 
 from sound.__main__ import main
 from sound.clips.extraction import extract
-from sound.clips.targets import share_frequencies
+from sound.clips.targets import ClipLoudness, share_frequencies
 from sound.clips.wav import as_wav, write_wav
 from sound.levels import (
     FULL,
@@ -202,6 +202,16 @@ def test_the_loudness_of_clips_is_kept_with_a_design(tmp_path):
     assert kept is not None and design.targets.loudness is not None
     np.testing.assert_array_equal(kept.lufs, design.targets.loudness.lufs)
     assert kept.seconds == pytest.approx([0.08, 0.15], abs=0.01)
+
+
+@pytest.mark.parametrize(("lufs", "seconds"), [(-20.0, 0.0), (-20.0, -1.0), (1e300, 1.0)])
+def test_impossible_loudness_is_refused(tmp_path, lufs, seconds):
+    design = design_of("short")
+    wrong = ClipLoudness(np.full(2, lufs), np.full(2, seconds))
+    with pytest.raises(ValueError, match="holds loudness of clips beyond 400 LUFS, or lengths"):
+        write_design(
+            tmp_path / "d.h5", replace(design, targets=replace(design.targets, loudness=wrong))
+        )
 
 
 @pytest.mark.parametrize("strength", [1e-3, 0.5, 3.0, 1e3])

@@ -18,7 +18,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.processes.threads import blas_threads
-from sound.bounds import require_level
+from sound.bounds import LONGEST_COMPARED, require_level
 from sound.clips.candidates import LEAST_DECAY
 from sound.clips.extent import ending, second_strike, strike_sample
 from sound.clips.free_vibration import SHORTEST_SAMPLES, free_modes, is_clipped, restored
@@ -104,8 +104,8 @@ def extract(
     _require_sound(clip)
     strike = strike_sample(clip)
     second = second_strike(clip[strike:], rate)
-    whole = clip[strike:]
-    clip = whole[:second]
+    compared = clip[strike:][: round(LONGEST_COMPARED * rate)]
+    clip = clip[strike:][:second]
     clip = clip[: ending(clip, rate)].copy()
     if len(clip) < SHORTEST_SAMPLES:
         raise UserError(
@@ -134,8 +134,8 @@ def extract(
         end_seconds=(strike + len(clip)) / rate,
         second_strike_seconds=None if second is None else (strike + second) / rate,
         glide=None if bend is None else asdict(bend),
-        loudness_lufs=relative_loudness(whole, rate),
-        loudness_seconds=len(whole) / rate,
+        loudness_lufs=relative_loudness(compared, rate),
+        loudness_seconds=len(compared) / rate,
     )
     return sound
 

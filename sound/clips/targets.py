@@ -30,7 +30,8 @@ FEWEST_MODES, MOST_MODES = 2, 30
 
 @dataclass(frozen=True)
 class ClipLoudness:
-    """Integrated loudness `lufs` (T,) [LUFS] of clips over `seconds` (T,), from strike to end.
+    """Integrated loudness `lufs` (T,) [LUFS] of clips over `seconds` (T,), from strike to end, of
+    30 s at most.
 
     It includes strikes that are left out and fade-outs, and does without the absolute gate of ITU-R
     BS.1770, see `sound.levels.relative_loudness`.

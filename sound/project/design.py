@@ -195,6 +195,10 @@ def fault(design: Design) -> str:
     for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
         if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
             return f"holds {name} that are no finite real numbers"
+    loudness = targets.loudness
+    if loudness is not None:
+        if (np.abs(loudness.lufs) > MOST_LUFS).any() or (loudness.seconds <= 0.0).any():
+            return f"holds loudness of clips beyond {MOST_LUFS:g} LUFS, or lengths not above 0 s"
     if design.fine is not None and sorted(design.fine.order) != list(range(N)):
         return "names other coarse modes of its fine ones than each once"
     if (design.fine_region is None) != (design.model.region is None):
@@ -217,6 +221,8 @@ _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
 }
 """Settings of a design that are used: expected kind, and test of each."""
+MOST_LUFS = 400.0
+"""Greatest magnitude of the loudness of a clip [LUFS]."""
 SOURCES = ("clips", "material")
 """Sources of a design's dampings."""
 

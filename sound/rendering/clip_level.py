@@ -7,6 +7,7 @@ import numpy as np
 
 from carillon.arrays import Array
 from solver.response.response import SAMPLE_RATE_HERTZ
+from sound.bounds import LONGEST_COMPARED
 from sound.clips.targets import Targets
 from sound.levels import BLOCK_SECONDS, relative_loudness
 from sound.synthesis.sinusoids import damped_sinusoids
@@ -93,8 +94,9 @@ def resampled(samples: Array, own: int, rate: int) -> Array:
 def _seconds(targets: Targets, t: int) -> float:
     """Time over which loudness is compared [s]: a clip's length, or that of its residual."""
     if targets.loudness is not None:
-        return float(targets.loudness.seconds[t])
-    return max(BLOCK_SECONDS, len(targets.residuals[t]) / targets.rates[t])
+        return min(LONGEST_COMPARED, float(targets.loudness.seconds[t]))
+    rest = len(targets.residuals[t]) / targets.rates[t]
+    return min(LONGEST_COMPARED, max(BLOCK_SECONDS, rest))
 
 
 def _samples(frequencies: Array, dampings: Array, amplitudes: Array, count: int) -> Array:
