@@ -706,12 +706,15 @@ def render(
     rate: int = SAMPLE_RATE,
     contact_seconds: float = 0.0,
     damping: tuple[float, float] | None = None,
+    raw: bool = False,
 ) -> Array:
-    """Samples (s,) of the sound of one strike or of many.
+    """Samples (s,) of the sound of one strike or of many, whose full scale is 1.
 
-    Those of a design are of full scale as its clips; those of a solution are scaled to 1 dB below.
-    Raises UserError for values that are out of range, if a point is far from the surface or a
-    target unknown, or if nothing sounds.
+    A strike of 1 N s at a target of a design is as loud as its clip (ITU-R BS.1770).  Strikes that
+    are stronger are scaled where they are beyond full scale, and peaks of others are attenuated.
+    Samples of a solution are scaled to a peak of 1 dB below full scale.  An end above -60 dBFS
+    fades, over a tenth of the sound, 0.5 s at most.  Raises UserError for values that are out of
+    range, if a point is far from the surface or a target unknown, or if nothing sounds.
 
     Parameters
     ----------
@@ -726,7 +729,8 @@ def render(
     times : float or (p,)
         When [s].
     seconds
-        Length, at most 600 s; until all has decayed unless given.
+        Length, at most 600 s; unless given, until all has decayed to -60 dBFS, at most 30 s after
+        the last strike.
     rate
         Samples per second [Hz].
     contact_seconds
@@ -734,6 +738,9 @@ def render(
     damping
         Of a solution: Rayleigh's coefficients of mass [1/s] and of stiffness [s]; those of its
         material unless given, and of a file that does not tell them `Material`'s default.
+    raw
+        Whether samples stay as they are computed: not kept within full scale, nor faded, and those
+        of a solution sums of amplitudes [kg^-1/2 N s].
 
     Examples
     --------
@@ -742,10 +749,7 @@ def render(
     >>> samples.shape, float(abs(samples).max().round(2))
     ((22050,), 0.89)
     """
-    from sound.bounds import require_length
-    from sound.clips.wav import PEAK
-    from sound.rendering.render import render as rendered
-    from sound.rendering.render import ringing_seconds
+    from sound.rendering.rendered_sound import LevelOptions, render_sound
     from sound.rendering.strikes_of_call import StrikesOfCall, listed
 
     strikes = StrikesOfCall(
@@ -760,19 +764,24 @@ def render(
     )
     heard = _heard(source, strikes.damping)
     hits = strikes.hits(heard)
-    length = strikes.seconds or max(strikes.times) + ringing_seconds(heard.solid)
-    require_length(length, strikes.rate)
-    how = (strikes.rate, strikes.contact_seconds, heard.listening)
-    samples = rendered(heard.solid, hits, length, *how)
-    peak = float(np.abs(samples).max(initial=0.0))
-    return samples * (PEAK / peak) if heard.listening is None and peak > 0.0 else samples
+    length, how = strikes.seconds, (strikes.rate, strikes.contact_seconds, heard.listening)
+    options = LevelOptions(raw=checked("raw", raw, bool))
+    return render_sound(heard.solid, hits, length, *how, options=options).samples
 
 
-def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> None:
+def write_wav(
+    path: str | Path,
+    samples: ArrayLike,
+    rate: int = SAMPLE_RATE,
+    *,
+    bits: int = 32,
+    dither_seed: int = 0,
+) -> None:
     """Write samples (s,), full scale being 1, as a sound file.
 
-    Raises UserError if they are no numbers or none at all, or cannot be written, or the name does
-    not end in .wav.
+    They are floats of 32 `bits`, or whole numbers of 16 or 24 with dither (TPDF), whose random
+    numbers begin with a seed.  Raises UserError if they are no numbers or none at all, beyond what
+    the bits hold, or cannot be written, or the name does not end in .wav.
 
     Examples
     --------
@@ -780,11 +789,14 @@ def write_wav(path: str | Path, samples: ArrayLike, rate: int = SAMPLE_RATE) -> 
     >>> with TemporaryDirectory() as folder:
     ...     ca.write_wav(f"{folder}/tone.wav", np.sin(0.1 * np.arange(2000)))
     """
-    from sound.bounds import SampleRate
+    from carillon.parameters.quantities import Seed
+    from sound.bounds import SampleBits, SampleRate
     from sound.clips.wav import write_wav as write
 
-    hertz = checked("rate", rate, SampleRate)
-    write(path, _numbers("samples", samples, 2, "samples (s,)"), hertz)
+    hertz, wide = checked("rate", rate, SampleRate), checked("bits", bits, SampleBits)
+    seed = checked("dither_seed", dither_seed, Seed)
+    numbers = _numbers("samples", samples, 2, "samples (s,)")
+    write(path, numbers, hertz, bits=wide, seed=seed)
 
 
 def extract(

@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from carillon.errors import UserError
+from carillon.parameters import Check
 from carillon.parameters.quantities import between
 
 LOWEST_RATE, HIGHEST_RATE = 1_000, 768_000
@@ -16,6 +17,8 @@ MOST_SAMPLES = 1 << 26
 memory."""
 LONGEST_SOUND = 600.0
 """Greatest length [s] of a rendered sound."""
+LONGEST_COMPARED = 30.0
+"""Greatest length [s] of the part of a clip that a strike is as loud as."""
 LONGEST_CONTACT = 1.0
 """Greatest duration of a strike's force [s]."""
 LEAST_IMPULSE, LARGEST_IMPULSE = 1e-6, 1e6
@@ -27,6 +30,21 @@ SampleRate = Annotated[int, between(LOWEST_RATE, HIGHEST_RATE)]
 """Samples per second [Hz]."""
 ContactSeconds = Annotated[float, between(0.0, LONGEST_CONTACT)]
 """Duration of a strike's force [s]; 0 is an impulse."""
+
+
+FLOAT_BITS = 32
+"""Bits of a sample that is a floating-point number."""
+WHOLE_BITS = (16, 24)
+"""Bits of samples that are whole numbers."""
+
+
+def _bits(value: int) -> int:
+    if value not in (*WHOLE_BITS, FLOAT_BITS):
+        raise ValueError(f"found {value}, expected 16, 24 or 32")
+    return value
+
+
+SampleBits = Annotated[int, Check(_bits)]
 
 
 def require_level(peak: float) -> None:

@@ -1,10 +1,26 @@
-"""Names of files that commands write; the endings name the formats."""
+"""Files that commands write: endings of names, which name the formats, and samples of sounds."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
 from carillon.errors import UserError
 from carillon.files.paths import require_writable
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import Seed
+from sound.bounds import FLOAT_BITS, SampleBits
+
+
+@parameters
+class WavOptions:
+    """Samples of a sound file that is written."""
+
+    bits: SampleBits = option(
+        FLOAT_BITS,
+        "bits of a sample: 32 is a floating-point number, 16 and 24 are whole numbers with dither "
+        "(default 32)",
+        metavar="{16,24,32}",
+    )
+    dither_seed: Seed = option(0, "random numbers of the dither")
 
 
 def require_output(

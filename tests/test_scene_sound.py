@@ -63,7 +63,7 @@ def test_a_strike_sounds_as_render_has_it(is_designed, design):
     body, impact = bodies[0], contact.impact
     hit = Hit(impact.seconds, contact.places[0, 1] + body.centre, -impact.impulse)
     expected = render(body.solid, [hit], 0.5, RATE, impact.duration, body.listening)
-    performance = perform(described, visible=False)
+    performance = perform(described, visible=False, raw=True)
     for ear in performance.sound.T:
         assert decibels(ear / performance.scale, expected) < -60.0
 
@@ -124,6 +124,19 @@ def test_sounds_reach_full_scale_and_not_beyond():
     assert np.abs(perform(quiet, visible=False).sound).max() == pytest.approx(0.99)
     faint = replace(described, sound=replace(described.sound, full_scale=1e6))
     assert np.abs(perform(faint, visible=False).sound).max() < 0.01
+    raw = perform(quiet, visible=False, raw=True)
+    assert np.abs(raw.sound).max() > 1.0 and raw.scale == pytest.approx(1e9)
+    assert raw.level.fade_seconds == 0.0
+
+
+def test_the_end_of_a_scene_fades_where_it_is_cut_off():
+    described = scene({**BAR, "position": [0, 0, 0.05]}, seconds=0.3)
+    cut = perform(described, visible=False)
+    assert cut.level.fade_seconds == pytest.approx(0.03, abs=1e-3) and cut.level.end_dbfs > -60.0
+    assert not cut.sound[-1].any()
+    assert cut.level.peak_dbfs == pytest.approx(20.0 * np.log10(0.99), abs=0.01)
+    damped = scene({**BAR, "position": [0, 0, 0.05], "damping": [400.0, 0.0]}, seconds=0.5)
+    assert perform(damped, visible=False).level.fade_seconds == 0.0
 
 
 def test_what_lies_on_the_ground_rings_shorter():

@@ -20,7 +20,8 @@ from sound.__main__ import main
 from sound.clips.noise import noise_part
 from sound.clips.wav import PEAK
 from sound.project.design_file import write_design
-from sound.rendering.listening import Listening, resampled
+from sound.rendering.clip_level import resampled
+from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.sinusoids import Bank, ring
@@ -120,14 +121,6 @@ def test_mixing_a_cluster_does_not_matter():
     np.testing.assert_allclose(one, two, atol=1e-12 * np.abs(one).max())
 
 
-def test_target_points_sound_as_loud_as_their_clips():
-    design = small_design()
-    solid, listening = design_solid()
-    for strike, target in zip(design.strikes, design.targets.amplitudes):
-        amplitudes = solid.amplitudes(strike.position[None], strike.inward[None])[0]
-        assert listening.gain(strike.position) * amplitudes.max() == pytest.approx(target.max())
-
-
 def test_weights_are_one_at_a_struck_point_and_blend_between():
     _, listening = design_solid()
     first, second = listening.positions
@@ -148,7 +141,10 @@ def test_noise_follows_the_impulse_and_the_rate():
     ]
     added = sounds[0] - sounds[1]
     noise, _ = noise_part(design.targets.residuals[1], design.targets.rates[1])
-    np.testing.assert_allclose(added[2205 : 2205 + len(noise)], 3.0 * noise, atol=1e-12)
+    begun = round(0.9 * len(noise))  # where it is cut off, it fades
+    expected = 3.0 * listening.noise_gains[1] * noise[:begun]
+    np.testing.assert_allclose(added[2205 : 2205 + begun], expected, atol=1e-12)
+    assert np.abs(added[2205 + begun :]).max() < np.abs(added).max()
     assert not added[:2205].any()
 
 
@@ -281,7 +277,11 @@ def test_the_solver_s_modes_can_be_heard(tmp_path, capsys):
     assert run(["render", path, *like, "--out", out]) == 0
     printed = json.loads(capsys.readouterr().out)
     np.testing.assert_allclose(printed["dampings_per_second"], small_design().targets.dampings)
-    assert max(printed["amplitudes"]) == pytest.approx(small_design().targets.amplitudes[1].max())
+    truth = SoundingSolid.of_truth(read_modes(path), small_design())
+    strike = small_design().strikes[1]
+    gain = printed["scale"] * Listening.of_design(small_design(), truth).gains[1]
+    expected = gain * truth.amplitudes(strike.position[None], strike.inward[None])[0]
+    np.testing.assert_allclose(printed["amplitudes"], expected)
 
 
 def test_modes_alone_stand_beside_the_sound(tmp_path, capsys):
@@ -304,13 +304,14 @@ def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(tmp_path, stren
     write_design(tmp_path / "design.h5", small_design())
     words = ["render", tmp_path / "design.h5", "--target", "side", "--strength", strength]
     plain, scaled, alone = (tmp_path / f"{name}.wav" for name in ("plain", "scaled", "alone"))
-    assert run([*words, "--out", plain]) == 0
+    assert run([*words, "--out", plain, "--raw"]) == 0
     assert run([*words, "--out", scaled, "--modes-out", alone, "--normalise", "--json"]) == 0
     told = json.loads(capsys.readouterr().out.splitlines()[-1])
     own, full, modes = (soundfile.read(path)[0] for path in (plain, scaled, alone))
     assert np.abs(full).max() == pytest.approx(told["peak"])
     assert 0.98 < told["peak"] < 1.0
-    np.testing.assert_allclose(full, told["scale"] * own, rtol=1e-5, atol=1e-9)
+    both = min(len(full), len(own))
+    np.testing.assert_allclose(full[:both], told["scale"] * own[:both], rtol=1e-5, atol=1e-9)
     assert np.abs(modes).max() < np.abs(full).max() + 0.05
     assert run([*words, "--out", scaled, "--normalise"]) == 0
     assert f"scaled by {told['scale']:.4g}" in capsys.readouterr().out

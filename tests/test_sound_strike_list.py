@@ -47,7 +47,7 @@ def test_the_sound_is_that_of_all_strikes(tmp_path, capsys):
     write_design(tmp_path / "design.h5", design)
     path, out = written(tmp_path, HEADER, *LINES), tmp_path / "all.wav"
     words = ["render", tmp_path / "design.h5", "--strikes", path, "--strength", 1.5, "--json"]
-    assert main([str(word) for word in [*words, "--out", out]]) == 0
+    assert main([str(word) for word in [*words, "--raw", "--out", out]]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["strikes"] == 4 and "amplitudes" not in told
     corner, side = design.strikes

@@ -100,13 +100,13 @@ ARROWS = {
     "sound.scenes.audible": "sound.rendering sound.scenes sound.scenes.contact sound.synthesis",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export
         sound.project sound.rendering""",
-    "sound.scenes.playing": """sound.clips sound.scenes sound.scenes.audible
+    "sound.scenes.playing": """sound sound.clips sound.scenes sound.scenes.audible
         sound.scenes.contact sound.synthesis""",
     #
     "studio": "",
     "studio.server": "sound.project studio",
     "studio.standalone": "solver.response sound.design sound.project sound.rendering studio",
-    "studio.scene": "sound.scenes studio studio.standalone",
+    "studio.scene": "sound sound.scenes studio studio.standalone",
     "studio.processes": """solver.analysis solver.files solver.response sound sound.clips
         sound.design sound.export sound.project sound.rendering studio studio.standalone""",
     "studio.session": "sound sound.clips sound.project studio studio.processes",

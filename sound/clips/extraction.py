@@ -19,13 +19,14 @@ from carillon.arrays import Array
 from carillon.command_line.progress import Watch, watched
 from carillon.errors import UserError
 from carillon.processes.threads import blas_threads
-from sound.bounds import require_level
+from sound.bounds import LONGEST_COMPARED, require_level
 from sound.clips.candidates import LEAST_DECAY
 from sound.clips.extent import ending, second_strike, strike_sample
 from sound.clips.free_vibration import SHORTEST_SAMPLES, free_modes, is_clipped, restored
 from sound.clips.glide import glide
 from sound.clips.mode_search import FEWEST_PERIODS, has_periods, is_mode
 from sound.clips.significance import Fit
+from sound.levels import relative_loudness
 from sound.synthesis.sinusoids import damped_sinusoids, superposed
 
 LONGEST_SECONDS = 6.0
@@ -114,6 +115,7 @@ def extract(
     _require_sound(clip)
     strike = strike_sample(clip)
     second = second_strike(clip[strike:], rate)
+    compared = clip[strike:][: round(LONGEST_COMPARED * rate)]
     clip = clip[strike:][:second]
     clip = clip[: ending(clip, rate)].copy()
     if len(clip) < SHORTEST_SAMPLES:
@@ -143,6 +145,8 @@ def extract(
         end_seconds=(strike + len(clip)) / rate,
         second_strike_seconds=None if second is None else (strike + second) / rate,
         glide=None if bend is None else asdict(bend),
+        loudness_lufs=relative_loudness(compared, rate),
+        loudness_seconds=len(compared) / rate,
     )
     return sound
 

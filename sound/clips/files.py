@@ -63,7 +63,8 @@ def _origin() -> bytes:
     """Hash of code, libraries and processor; with others, modes differ or their last digits do."""
     digest = hashlib.sha256()
     room = Path(__file__).parent.parent
-    for source in sorted([*room.glob("clips/*.py"), *room.glob("synthesis/*.py")]):
+    sources = [*room.glob("clips/*.py"), *room.glob("synthesis/*.py"), room / "levels.py"]
+    for source in sorted(sources):
         digest.update(source.read_bytes())
     digest.update(json.dumps([provenance.versions(), provenance.processor()]).encode())
     return digest.digest()

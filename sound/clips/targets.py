@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -11,6 +12,8 @@ from carillon.arrays import Array, Flags, Index
 from carillon.errors import UserError
 from sound.clips.audibility import heard_partials, loudness_shares
 from sound.clips.extraction import ModalSound
+from sound.clips.noise import noise_part
+from sound.levels import faded
 
 SAME_HERTZ, SAME_FRACTION = 1.0, 0.002
 """Greatest distance of modes of different clips that count as one, in Hz or as a share, whichever
@@ -27,14 +30,29 @@ MOST_MODES = 30
 
 
 @dataclass(frozen=True)
+class ClipLoudness:
+    """Integrated loudness `lufs` (T,) [LUFS] of clips over `seconds` (T,), from strike to end, of
+    30 s at most.
+
+    It includes strikes that are left out and fade-outs, and does without the absolute gate of ITU-R
+    BS.1770, see `sound.levels.relative_loudness`.
+    """
+
+    lufs: Array
+    seconds: Array
+
+
+@dataclass(frozen=True)
 class Targets:
     """Modes that a design should have at T struck points of some names.
 
     Ascending frequencies (N,) [Hz] and dampings (N,) [1/s] are shared by all points; amplitudes (T,
     N) are those at the strike, 0 where the clip of a point lacks a mode.  `residuals` are T arrays
-    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.  Modes that are
-    `silent` (N,), none if None, are partials of no clip: they lie between partials, and shall not
-    sound, wherever their frequencies come to be.
+    (s,), each clip without its modes, and `rates` [Hz] their sampling rates.  The `loudness` of the
+    clips is None if it is not known.  Modes that are `silent` (N,), none if None, are partials of
+    no clip: they lie between partials, and shall not sound, wherever their frequencies come to be.
+    Partials that no mode of the solid has are `left_out` (q,) [Hz], with their share in the
+    loudness of the clips.
     """
 
     names: tuple[str, ...]
@@ -43,11 +61,10 @@ class Targets:
     amplitudes: Array
     residuals: tuple[Array, ...]
     rates: tuple[int, ...]
+    loudness: ClipLoudness | None = None
     silent: Flags | None = None
     left_out: Array | None = None
     left_out_share: float = 0.0
-    """(q,) [Hz] or None: partials of the clips that no mode of the solid has, and their share in
-    the loudness of the clips."""
 
     @property
     def sounding(self) -> Index:
@@ -63,6 +80,15 @@ class Targets:
             loudness_shares(self.frequencies, self.dampings, row) for row in self.amplitudes
         ]
         return np.asarray(np.mean(of_clips, axis=0))
+
+    @cached_property
+    def noises(self) -> tuple[tuple[Array, float], ...]:
+        """Noise (s,) of each residual, which fades where it is cut off, and the share of the
+        residual's energy in tones, which is left out; see `sound.clips.noise`."""
+        parts = [noise_part(rest, rate) for rest, rate in zip(self.residuals, self.rates)]
+        return tuple(
+            (faded(noise, rate)[0], share) for (noise, share), rate in zip(parts, self.rates)
+        )
 
 
 def share_frequencies(
@@ -120,7 +146,20 @@ def share_frequencies(
         amplitudes=table[:, chosen],
         residuals=tuple(sound.residual for sound in sounds),
         rates=tuple(sound.rate for sound in sounds),
+        loudness=_loudness(sounds),
     )
+
+
+def _loudness(sounds: Sequence[ModalSound]) -> ClipLoudness | None:
+    """Loudness of the clips that sounds come from; None if one comes from no clip."""
+    try:
+        rows = [
+            (each.evidence["loudness_lufs"], each.evidence["loudness_seconds"]) for each in sounds
+        ]
+    except KeyError:
+        return None
+    lufs, seconds = np.array(rows, dtype=float).T
+    return ClipLoudness(lufs, seconds)
 
 
 def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:

@@ -11,6 +11,7 @@ from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import cause, require_file
 from sound.bounds import (
+    FLOAT_BITS,
     HIGHEST_RATE,
     LOWEST_RATE,
     MOST_CHANNELS,
@@ -18,6 +19,7 @@ from sound.bounds import (
     require_level,
 )
 from sound.clips.free_vibration import CLIPPED_RUN, is_clipped
+from sound.levels import dithered
 from sound.outputs import require_output
 
 ENDINGS = (".wav",)
@@ -50,11 +52,18 @@ def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]
         raise UserError(f"{path}: {error}") from None
 
 
-def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -> None:
-    """Write one channel (s,) or several (s, c) as WAV of 32-bit floats, atomically; full scale is
-    1.
+def write_wav(
+    path: str | Path,
+    samples: Array,
+    rate: int,
+    peak: bool = False,
+    bits: int = FLOAT_BITS,
+    seed: int = 0,
+) -> None:
+    """Write one channel (s,) or several (s, c) as WAV, atomically; full scale is 1.
 
-    With `peak`, the largest magnitude becomes `PEAK`.  Raises UserError if the name does not end in
+    Samples are floats of 32 `bits`, or whole numbers of 16 or 24 with dither of a `seed`.  With
+    `peak`, the largest magnitude becomes `PEAK`.  Raises UserError if the name does not end in
     .wav, samples are not finite or beyond what the format holds, or the file cannot be written.
     """
     require_output(path, ENDINGS)
@@ -64,25 +73,38 @@ def write_wav(path: str | Path, samples: Array, rate: int, peak: bool = False) -
         raise UserError(f"{path}: not written, the sound has samples that are not finite numbers")
     if peak and largest > 0.0:
         samples, largest = samples * (PEAK / largest), PEAK
+    if largest > 1.0 and bits != FLOAT_BITS:
+        raise UserError(
+            f"{path}: not written, the sound reaches {largest:.4g} times full scale, more than "
+            f"whole numbers of {bits} bits hold; write {FLOAT_BITS} bits, or a fainter sound"
+        )
     if largest > np.finfo(np.float32).max:
         raise UserError(
             f"{path}: not written, the sound reaches {largest:.3g}, more than its samples hold"
         )
     # Through memory, since the library does not say why it could not write to a disk.
-    content = as_wav(samples, rate)
+    content = as_wav(samples, rate, bits, seed)
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
 
 
-def as_wav(samples: Array, rate: int) -> bytes:
-    """One channel (s,), or several (s, c), as the content of a WAV file of 32-bit floats.
+def as_wav(samples: Array, rate: int, bits: int = FLOAT_BITS, seed: int = 0) -> bytes:
+    """One channel (s,), or several (s, c), as the content of a WAV file; see `write_wav`.
 
-    The same samples make the same bytes: libsndfile would add the time of day (chunk PEAK).
+    The same samples make the same bytes: of floats, libsndfile would add the time of day (chunk
+    PEAK).
     """
-    from scipy.io import wavfile  # Slow to load.
-
     content = io.BytesIO()
-    wavfile.write(content, rate, samples.astype(np.float32))
+    if bits == FLOAT_BITS:
+        from scipy.io import wavfile  # Slow to load.
+
+        wavfile.write(content, rate, samples.astype(np.float32))
+    else:
+        import soundfile  # Slow to load.
+
+        # libsndfile takes the upper bits of whole numbers of 32 bits.
+        whole = dithered(samples, bits, seed) << (32 - bits)
+        soundfile.write(content, whole, rate, format="WAV", subtype=f"PCM_{bits}")
     return content.getvalue()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,13 +21,14 @@ from sound.bounds import (
     require_length,
 )
 from sound.commands.common_options import DampingOptions
+from sound.outputs import WavOptions
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.rendering.heard_solid import HeardSolid
+    from sound.rendering.listening import Listening
     from sound.rendering.render import Hit
+    from sound.rendering.rendered_sound import RenderedSound
 
-FULL = 0.99
-"""Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""
 TOLD = 1e-3
 """Least share of the clips' energy in missed tones that is reported."""
 
@@ -73,7 +74,10 @@ class RenderOptions:
 
     file: str = option(REQUIRED, "design.h5, or modes.h5 of the solver")
     out: str = option(REQUIRED, "file to write (WAV)")
-    seconds: Positive | None = option(None, "length (default: until it decays)")
+    seconds: Positive | None = option(
+        None,
+        "length (default: until it has decayed to -60 dBFS, at most 30 s after the last strike)",
+    )
     rate: SampleRate = option(44_100, "samples per second")
     contact_seconds: ContactSeconds = option(
         0.0,
@@ -83,7 +87,6 @@ class RenderOptions:
     modes_out: str | None = option(
         None, "file for the modes alone, just as loud (WAV)", metavar="FILE.wav"
     )
-    normalise: bool = option(False, "scale to full scale, and say by how much")
     like: str | None = option(
         None,
         "for modes.h5 of a designed object: dampings, points, loudness, noise of a design",
@@ -95,7 +98,24 @@ class RenderOptions:
         "(default: that of the solid if its file tells, or 30 1e-6)",
         metavar=("ALPHA", "BETA"),
     )
+    fade_seconds: Annotated[float, between(0.0, LONGEST_SOUND)] | None = option(
+        None,
+        "fade at the end (default: a tenth of the length, 0.5 s at most, if the end is louder than "
+        "-60 dBFS; none if --raw)",
+    )
     json: bool = option(False, "print what sounds as JSON")
+
+
+@parameters
+class ScaleOptions:
+    """How samples are scaled, by one of the two; by default they are kept within full scale."""
+
+    normalise: bool = option(False, "scale to full scale, and say by how much")
+    raw: bool = option(
+        False,
+        "samples as they are computed, even beyond full scale: of a design as loud as its clips, "
+        "of other modes sums of amplitudes [kg^-1/2 N s]",
+    )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,50 +123,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser.add_mutually_exclusive_group(required=True), PointOptions)
     add_options(parser.add_mutually_exclusive_group(), ImpulseOptions)
     add_options(parser, RenderOptions, positional=("file",))
+    add_options(parser.add_mutually_exclusive_group(), ScaleOptions)
+    add_options(parser, WavOptions)
     add_options(parser, DampingOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Render, write, and say what sounds."""
-    import numpy as np
-
-    from sound.clips.wav import PEAK, write_wav
+    from sound.clips.wav import write_wav
     from sound.rendering.heard_solid import open_heard_solid
-    from sound.rendering.render import rendered_parts, residual_share, ringing_seconds
+    from sound.rendering.rendered_sound import LevelOptions, render_sound
 
     options, points = collect(RenderOptions, arguments), collect(PointOptions, arguments)
     _require_outputs(options, points)
     source = collect(DampingOptions, arguments).damping_from
+    scale = collect(ScaleOptions, arguments)
     heard = open_heard_solid(options.file, options.like, options.damping, source)
     hits = _hits(heard, points, collect(ImpulseOptions, arguments))
-    seconds = options.seconds or max(hit.seconds for hit in hits) + ringing_seconds(heard.solid)
-    require_length(seconds, options.rate)
-    modes, noise = rendered_parts(
+    sound = render_sound(
         heard.solid,
         hits,
-        seconds,
+        options.seconds,
         options.rate,
         options.contact_seconds,
         heard.listening,
         not options.no_residual,
+        LevelOptions(scale.raw, scale.normalise, options.fade_seconds),
     )
-    sound = modes + noise
-    peak = float(np.abs(sound).max(initial=0.0))
-    scale = 1.0
-    if peak > 0.0 and (options.normalise or heard.listening is None):
-        scale = (FULL if options.normalise else PEAK) / peak
-    write_wav(options.out, scale * sound, options.rate)
+    format = collect(WavOptions, arguments)
+    bits, seed = format.bits, format.dither_seed
+    write_wav(options.out, sound.samples, options.rate, bits=bits, seed=seed)
     if options.modes_out is not None:
-        write_wav(options.modes_out, scale * modes, options.rate)
-    modes, noise = scale * modes, scale * noise
-    summary = _summary(options, heard, hits, scale) | {
-        "peak": float(np.abs(modes + noise).max(initial=0.0)),
-        "residual_share": residual_share(modes, noise),
-    }
+        write_wav(options.modes_out, sound.modes, options.rate, bits=bits, seed=seed)
+    summary = _summary(options, heard, hits, sound)
     print(json.dumps(summary) if options.json else _sentence(summary))
-    if scale * peak > 1.0:
-        advice = "lower --strength for players, or --normalise"
-        print(f"sound: {scale * peak:.2f} of full scale; {advice}", file=sys.stderr)
     return 0
 
 
@@ -193,19 +203,29 @@ def _hits(heard: HeardSolid, points: PointOptions, strike: ImpulseOptions) -> li
 
 
 def _summary(
-    options: RenderOptions, heard: HeardSolid, hits: list[Hit], scale: float
+    options: RenderOptions, heard: HeardSolid, hits: list[Hit], sound: RenderedSound
 ) -> dict[str, Any]:
+    from sound.rendering.render import residual_share
+
     solid, listening = heard.solid, heard.listening
     audible = solid.frequencies < options.rate / 2.0
     summary: dict[str, Any] = {
         "out": str(Path(options.out)),
         "modes_out": None if options.modes_out is None else str(Path(options.modes_out)),
         "rate_hz": options.rate,
+        "seconds": len(sound.samples) / options.rate,
         "strikes": len(hits),
-        "scale": scale,
+        "scale": sound.scale,
+        "peak": float(abs(sound.samples).max(initial=0.0)),
+        **sound.level.as_dict(),
+        "limited_decibels": sound.limited_decibels,
+        "cut_off": sound.cut_off,
+        "clip_loudness_lufs": None,
+        "loudness_over_clip_lufs": None,
         "frequencies_hz": solid.frequencies[audible].tolist(),
         "dampings_per_second": solid.dampings[audible].tolist(),
         "modes_left_out": int((~audible).sum()),
+        "residual_share": residual_share(sound.modes, sound.noise),
         "missed_share": None,
     }
     if listening is not None:
@@ -214,7 +234,9 @@ def _summary(
     if len(hits) > 1:
         return summary
     (hit,) = hits
-    gain = scale if listening is None else scale * listening.gain(hit.position)
+    if listening is not None:
+        summary |= _beside_clip(listening, hit, sound)
+    gain = sound.scale if listening is None else sound.scale * listening.gain(hit.position)
     amplitudes = gain * solid.amplitudes(hit.position[None], hit.impulse[None])[0]
     return summary | {
         "position_m": hit.position.tolist(),
@@ -225,14 +247,46 @@ def _summary(
     }
 
 
+def _beside_clip(listening: Listening, hit: Hit, sound: RenderedSound) -> dict[str, float]:
+    """Loudness of the clip of a struck target, and of the sound over as long; none elsewhere.
+
+    Nor is there any of a sound that is cut short or silent.
+    """
+    from sound.levels import END_DBFS
+
+    loudness, weights = listening.targets.loudness, listening.weights(hit.position)
+    target = int(weights.argmax())
+    if loudness is None or weights[target] < 1.0 or not sound.samples.any():
+        return {}
+    is_short = len(sound.samples) < round(loudness.seconds[target] * sound.rate)
+    end = sound.level.end_dbfs
+    if is_short and end is not None and end > END_DBFS:
+        return {}
+    return {
+        "clip_loudness_lufs": float(loudness.lufs[target]),
+        "loudness_over_clip_lufs": sound.relative_loudness(float(loudness.seconds[target])),
+    }
+
+
 def _sentence(summary: dict[str, Any]) -> str:
-    from math import log10
+    from sound.levels import SoundLevel, decibels
 
     hertz = summary["frequencies_hz"]
     span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
-    text = f"{summary['out']}: {len(hertz)} modes{span}, peak {summary['peak']:.3g} of full scale"
+    level = SoundLevel(*(summary[each.name] for each in fields(SoundLevel)))
+    text = f"{summary['out']}: {len(hertz)} modes{span}, {summary['seconds']:.3g} s, "
+    text += level.in_words()
+    if summary["cut_off"]:
+        text += " since it rings on (--seconds for more)"
     if summary["scale"] != 1.0:
-        text += f" (scaled by {summary['scale']:.4g}, {20.0 * log10(summary['scale']):+.1f} dB)"
+        text += f"; scaled by {summary['scale']:.4g} ({decibels(summary['scale']):+.1f} dB)"
+    if summary["limited_decibels"]:
+        text += f"; peaks are attenuated by up to {summary['limited_decibels']:.1f} dB"
+    if summary["clip_loudness_lufs"] is not None:
+        text += (
+            f"; over the length of its clip {summary['loudness_over_clip_lufs']:.1f} LUFS, "
+            f"the clip {summary['clip_loudness_lufs']:.1f} LUFS"
+        )
     if summary["modes_left_out"]:
         text += f"; {summary['modes_left_out']} above half the sampling rate are left out"
     if summary["missed_share"] is None:

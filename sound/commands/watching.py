@@ -9,7 +9,6 @@ from pathlib import Path
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.yaml_input import MOST_BYTES
-from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import ENDINGS, write_wav
 from sound.design.interrupts import interruptible
 from sound.design.optimise import optimise
@@ -20,7 +19,8 @@ from sound.project.design import Design
 from sound.project.design_file import write_design
 from sound.project.project import Project
 from sound.rendering.listening import Listening
-from sound.rendering.render import Hit, render, ringing_seconds
+from sound.rendering.render import Hit
+from sound.rendering.rendered_sound import render_sound
 from sound.rendering.solid import SoundingSolid
 
 LOOK_SECONDS = 1.0
@@ -178,8 +178,7 @@ def write_sounds(files: Mapping[str, Path], design: Design) -> None:
     """Write what `render` makes of a strike of each target."""
     solid = SoundingSolid.of_design(design)
     listening = Listening.of_design(design, solid)
-    seconds = ringing_seconds(solid)
     for strike in design.strikes:
         hit = Hit(0.0, strike.position, strike.inward)
-        sound = render(solid, [hit], seconds, listening=listening)
-        write_wav(files[strike.name], sound, SAMPLE_RATE_HERTZ)
+        sound = render_sound(solid, [hit], listening=listening)
+        write_wav(files[strike.name], sound.samples, sound.rate)

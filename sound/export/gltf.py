@@ -39,7 +39,8 @@ from sound.export.gltf_material import acoustic_material
 from sound.export.gltf_surface import surface_material, surface_mesh
 from sound.project.design import Design
 from sound.rendering.listening import Listening
-from sound.rendering.render import Hit, render, ringing_seconds
+from sound.rendering.render import Hit, render
+from sound.rendering.rendered_sound import ringing_seconds
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.bodies import upright
 

@@ -33,7 +33,7 @@ COLUMNS = {
 
 
 @dataclass(frozen=True)
-class SoundLevel:
+class LevelOfSound:
     """A row of the table of levels, see `COLUMNS`."""
 
     file: str
@@ -51,19 +51,19 @@ class SoundLevel:
     z_m: float
 
 
-def with_gains(sounds: Sequence[tuple[float, SoundLevel]]) -> list[SoundLevel]:
+def with_gains(sounds: Sequence[tuple[float, LevelOfSound]]) -> list[LevelOfSound]:
     """Rows with the gains [dB] that make files as loud to each other as the strikes were.
 
     `sounds`: what each sound was multiplied by, and its row.  The greatest gain is 0 dB.
     """
     least = min(gain for gain, _ in sounds)
     return [
-        SoundLevel(**{**asdict(level), "gain_db": decibels(least / gain) + 0.0})
+        LevelOfSound(**{**asdict(level), "gain_db": decibels(least / gain) + 0.0})
         for gain, level in sounds
     ]
 
 
-def levels_csv(levels: Sequence[SoundLevel]) -> str:
+def levels_csv(levels: Sequence[LevelOfSound]) -> str:
     """The table of levels as CSV."""
     content = io.StringIO()
     table = csv.writer(content, lineterminator="\n")
@@ -74,7 +74,7 @@ def levels_csv(levels: Sequence[SoundLevel]) -> str:
     return content.getvalue()
 
 
-def levels_json(name: str, levels: Sequence[SoundLevel], rate: int, seed: int) -> str:
+def levels_json(name: str, levels: Sequence[LevelOfSound], rate: int, seed: int) -> str:
     """The table of levels as JSON, with the sampling rate [Hz] and the seed of the variations."""
     content: dict[str, Any] = {
         "format": "carillon sound set 1",

@@ -1,15 +1,14 @@
-"""Levels and endings of sounds that game engines play: trimmed, faded, at one peak, of 24 bits."""
-
-import io
+"""Levels and endings of sounds that game engines play: trimmed, faded, at one peak."""
 
 import numpy as np
 
 from carillon.arrays import Array
+from sound.levels import faded
 
 PEAK_DECIBELS = -1.0
 """Peak of a sound [dB of full scale]: converters and codecs overshoot a little."""
 TAIL_DECIBELS = -60.0
-"""SoundLevel below the peak [dB] from which on the end of a sound is cut."""
+"""Level below the peak [dB] from which on the end of a sound is cut."""
 FADE_SECONDS = 0.02
 """Time in which an end at that level fades to silence."""
 LONG_FADE_SECONDS = 1.0
@@ -32,20 +31,9 @@ def mastered(sound: Array, rate: int) -> tuple[Array, float]:
     if largest == 0.0:
         return sound, 1.0
     last = int(np.flatnonzero(np.abs(sound) > largest * 10.0 ** (TAIL_DECIBELS / 20.0))[-1])
-    faded = sound[: last + 1].copy()
     rings = last + 1 > len(sound) - FADE_SECONDS * rate
     seconds = min(LONG_FADE_SECONDS, len(sound) / rate / 4.0) if rings else FADE_SECONDS
-    count = min(len(faded), max(1, round(seconds * rate)))
-    faded[len(faded) - count :] *= 0.5 + 0.5 * np.cos(np.pi * np.arange(1, count + 1) / count)
+    made = faded(sound[: last + 1], rate, max(seconds, 1.0 / rate))[0]
     # The fade may take the largest sample along where a sound is shorter.
-    gain = 10.0 ** (PEAK_DECIBELS / 20.0) / float(np.abs(faded).max())
-    return gain * faded, gain
-
-
-def wav_of_24_bits(sound: Array, rate: int) -> bytes:
-    """Samples (s,) as the content of a WAV file of 24-bit integers; full scale is 1."""
-    import soundfile  # Slow to load.
-
-    content = io.BytesIO()
-    soundfile.write(content, sound, rate, "PCM_24", format="WAV")
-    return content.getvalue()
+    gain = 10.0 ** (PEAK_DECIBELS / 20.0) / float(np.abs(made).max())
+    return gain * made, gain

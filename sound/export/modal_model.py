@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
+from sound.levels import DECAY_NEPERS
 from sound.project.design import Design
 from sound.rendering.listening import Listening
-from sound.rendering.render import DECAY_NEPERS
 from sound.rendering.solid import SoundingSolid
 
 LEAST_DAMPING = 1e-3

@@ -10,13 +10,15 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import UserError
-from sound.export.levels import SoundLevel, decibels
-from sound.export.mastering import mastered, wav_of_24_bits
+from sound.clips.wav import as_wav
+from sound.export.levels import LevelOfSound, decibels
+from sound.export.mastering import mastered
 from sound.export.modal_model import StruckPoint
 from sound.export.sound_set_options import SoundSetOptions
 from sound.project.design import Design
 from sound.rendering.listening import Listening
-from sound.rendering.render import Hit, render, ringing_seconds
+from sound.rendering.render import Hit, render
+from sound.rendering.rendered_sound import ringing_seconds
 from sound.rendering.solid import SoundingSolid
 from sound.strikes import longest_side
 
@@ -40,7 +42,7 @@ class SetSound:
 
     content: bytes
     gain: float
-    level: SoundLevel
+    level: LevelOfSound
 
 
 def require_count(points: int, options: SoundSetOptions) -> None:
@@ -79,7 +81,7 @@ def rendered_set(
                 hit = Hit(0.0, position, strength * inward)
                 sound = render(solid, [hit], seconds, options.rate, contact, listening)
                 made, gain = mastered(sound, options.rate)
-                level = SoundLevel(
+                level = LevelOfSound(
                     f"{file_names([name])[0]}_{label}_s{number}_v{variation}.wav",
                     point.name,
                     strength,
@@ -92,7 +94,7 @@ def rendered_set(
                     contact,
                     *position.tolist(),
                 )
-                yield SetSound(wav_of_24_bits(made, options.rate), gain, level)
+                yield SetSound(as_wav(made, options.rate, 24), gain, level)
 
 
 def _points_near(

@@ -184,6 +184,11 @@ def fault(design: Design) -> str:
             ("fine frequencies", design.fine.hertz, (N,)),
             ("order of fine modes", design.fine.order, (N,)),
         ]
+    if targets.loudness is not None:
+        expected += [
+            ("loudness of clips", targets.loudness.lufs, (T,)),
+            ("lengths of clips", targets.loudness.seconds, (T,)),
+        ]
     if design.damping is not None:
         expected.append(("dampings of the material", design.damping.dampings, (N,)))
         if design.damping.loss_factors is not None:
@@ -205,6 +210,10 @@ def fault(design: Design) -> str:
             return f"holds {name} that are no finite real numbers"
     if not len(targets.sounding):
         return "holds silent modes alone"
+    loudness = targets.loudness
+    if loudness is not None:
+        if (np.abs(loudness.lufs) > MOST_LUFS).any() or (loudness.seconds <= 0.0).any():
+            return f"holds loudness of clips beyond {MOST_LUFS:g} LUFS, or lengths not above 0 s"
     if design.fine is not None and sorted(design.fine.order) != list(range(N)):
         return "names other coarse modes of its fine ones than each once"
     if (design.fine_region is None) != (design.model.region is None):
@@ -227,6 +236,8 @@ _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
 }
 """Settings of a design that are used: expected kind, and test of each."""
+MOST_LUFS = 400.0
+"""Greatest magnitude of the loudness of a clip [LUFS]."""
 SOURCES = ("clips", "material")
 """Sources of a design's dampings."""
 

@@ -14,7 +14,7 @@ from carillon.records import provenance
 from carillon.records.measurement import measured
 from solver.files.model_group import get_model, put_model
 from solver.files.modes_file import put_eigenvalues, put_modes
-from sound.clips.targets import Targets
+from sound.clips.targets import ClipLoudness, Targets
 from sound.project.design import (
     HISTORY,
     HISTORY_TYPE,
@@ -153,6 +153,10 @@ def _put_targets(group: h5py.Group, targets: Targets) -> None:
         put(group, "silent", silent, "1", "1 of modes that are no partials and shall not sound")
     for number, residual in enumerate(targets.residuals):
         put(group, f"residuals/{number}", residual, "full scale", "a clip less its modes")
+    if targets.loudness is not None:
+        meaning = "integrated loudness of each clip from its strike on (ITU-R BS.1770)"
+        put(group, "loudness/lufs", targets.loudness.lufs, "LUFS", meaning)
+        put(group, "loudness/seconds", targets.loudness.seconds, "s", "time that it is of")
 
 
 def _get_targets(group: h5py.Group) -> Targets:
@@ -168,6 +172,9 @@ def _get_targets(group: h5py.Group) -> Targets:
         group["amplitudes"][()],
         tuple(group[f"residuals/{number}"][()] for number in range(len(names))),
         tuple(int(rate) for rate in group["rates"][()]),
+        ClipLoudness(group["loudness/lufs"][()], group["loudness/seconds"][()])
+        if "loudness" in group
+        else None,
         silent,
         left_out,
         share,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from math import gcd
 
 import numpy as np
 
 from carillon.arrays import Array
-from sound.clips.noise import noise_part
+from sound.clips.targets import Targets
 from sound.project.design import Design
+from sound.rendering.clip_level import clip_level, resampled
 from sound.rendering.solid import SoundingSolid
 
 
@@ -19,42 +18,38 @@ class Listening:
     """Loudness and noise of a design's clips at the struck points, at positions (T, 3) [m].
 
     A clip counts as the sound of 1 N s along the inward normal.  The gain (T,) [kg^1/2 N^-1 s^-1]
-    of its point, samples of full scale per amplitude, makes the loudest mode there as loud as the
-    clip's, as Eq. 2 compares them.  Elsewhere gains and noise are averages weighted by the inverse
-    square of the distance.  Only the noise of a residual is heard: partials that were missed belong
-    to the clip, not to the material.
+    of its point, samples of full scale per amplitude, makes such a strike as loud as the clip, and
+    so does the factor `noise_gains` (T,) on the clip's noise, see `sound.rendering.clip_level`.
+    Elsewhere gains and noise are averages weighted by the inverse square of the distance.  Only the
+    noise of a residual is heard: partials that were missed belong to the clip, not to the material.
 
-    `residuals` are T arrays (s,) at `rates` [Hz], the clips without their modes, and `energies`
-    (T,) those of the clips' modes: squared samples summed over all time.
+    `targets` are those of the clips, and `energies` (T,) those of the clips' modes: squared samples
+    summed over all time.
     """
 
     positions: Array
     gains: Array
-    residuals: tuple[Array, ...]
-    rates: tuple[int, ...]
+    noise_gains: Array
+    targets: Targets
     energies: Array
 
     @classmethod
     def of_design(cls, design: Design, solid: SoundingSolid) -> Listening:
-        """Gains of a solid's modes at the struck points of a design, and the clips' residuals."""
+        """Gains of a solid's modes at the struck points of a design, and the clips' noise."""
         targets = design.targets
         positions = np.array([strike.position for strike in design.strikes])
         inward = np.array([strike.inward for strike in design.strikes])
-        loudest = solid.amplitudes(positions, inward).max(axis=1)
-        gains = targets.amplitudes.max(axis=1) / loudest
+        amplitudes = solid.amplitudes(positions, inward)
+        level = clip_level(targets, solid.frequencies, solid.dampings, amplitudes)
         squares = (targets.amplitudes**2 / (4.0 * targets.dampings)).sum(axis=1)
         energies = np.array(targets.rates) * squares
-        return cls(positions, gains, targets.residuals, targets.rates, energies)
-
-    @cached_property
-    def _noise(self) -> list[tuple[Array, float]]:
-        return [noise_part(rest, rate) for rest, rate in zip(self.residuals, self.rates)]
+        return cls(positions, level.gains, level.noise, targets, energies)
 
     @property
     def missed(self) -> Array:
         """Shares (T,) of the clips' energies in tones of the residuals, which are not heard."""
-        rests = np.array([rest @ rest for rest in self.residuals])
-        lacking = np.array([share for _, share in self._noise]) * rests
+        rests = np.array([rest @ rest for rest in self.targets.residuals])
+        lacking = np.array([share for _, share in self.targets.noises]) * rests
         whole = self.energies + rests
         return np.asarray(np.divide(lacking, whole, out=np.zeros_like(whole), where=whole > 0.0))
 
@@ -66,9 +61,15 @@ class Listening:
         """Gain at a point (3,) [m]."""
         return float(self.weights(position) @ self.gains)
 
+    def clip_seconds(self, position: Array) -> float | None:
+        """Length of the clips at a point (3,) [m], over which it is as loud as these [s]."""
+        loudness = self.targets.loudness
+        return None if loudness is None else float(self.weights(position) @ loudness.seconds)
+
     def noise(self, rate: int) -> list[Array]:
         """T residuals (s,) without their tones, after 1 N s, at the sampling rate `rate` [Hz]."""
-        return [resampled(noise, own, rate) for (noise, _), own in zip(self._noise, self.rates)]
+        parts = zip(self.noise_gains, self.targets.noises, self.targets.rates)
+        return [gain * resampled(noise, own, rate) for gain, (noise, _), own in parts]
 
 
 def near_weights(points: Array, positions: Array) -> Array:
@@ -84,13 +85,3 @@ def near_weights(points: Array, positions: Array) -> Array:
     at = square == 0.0
     inverse = np.where(nearest == 0.0, at, nearest / np.where(at, 1.0, square))
     return np.asarray(inverse / inverse.sum(axis=-1, keepdims=True))
-
-
-def resampled(samples: Array, own: int, rate: int) -> Array:
-    """Samples resampled from the rate `own` to `rate`."""
-    if own == rate or not len(samples):
-        return samples
-    from scipy.signal import resample_poly
-
-    common = gcd(own, rate)
-    return np.asarray(resample_poly(samples, rate // common, own // common))

@@ -12,11 +12,6 @@ from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.sinusoids import Bank, ring
 
-DECAY_NEPERS = np.log(1e3)
-"""Decay by 60 dB [nepers]."""
-LONGEST_SECONDS = 6.0
-"""Greatest length of a sound whose length is not given [s]."""
-
 
 @dataclass(frozen=True)
 class Hit:
@@ -87,9 +82,3 @@ def residual_share(modes: Array, noise: Array) -> float:
     """Share of the noise in a sound's energy; 0 of silence."""
     own, other = float(noise @ noise), float(modes @ modes)
     return own / (own + other) if own > 0.0 else 0.0
-
-
-def ringing_seconds(solid: SoundingSolid) -> float:
-    """Time until the slowest mode has decayed by 60 dB, at most `LONGEST_SECONDS`."""
-    slowest = float(solid.dampings.min())
-    return min(LONGEST_SECONDS, DECAY_NEPERS / slowest) if slowest > 0.0 else LONGEST_SECONDS

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
+from sound.levels import SoundLevel
 from sound.scenes.scene import GROUND_NAME
 
 GROUND = -1
@@ -176,6 +177,8 @@ class Performance:
     moved: dict[str, list[float]] = field(default_factory=dict)
     """dict: displacements (3,) [m] of overlapping objects that were separated at the start, by
     name."""
+    level: SoundLevel | None = None
+    """Loudness, peak and end of the sound; None if unknown."""
 
 
 def linear_light(colour: Sequence[float]) -> Array:

@@ -76,6 +76,7 @@ def sounds(
         "Sounds",
         prose(SOUNDS),
         grid(tables["distances"]),
+        grid(tables["loudness"]),
         *points,
         article(
             None,

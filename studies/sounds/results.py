@@ -13,7 +13,7 @@ from sound.clips.files import extract_file
 from sound.clips.wav import read_wav
 from sound.project.design import Design
 from sound.project.design_file import read_design
-from sound.rendering.listening import resampled
+from sound.rendering.clip_level import resampled
 from sound.synthesis.sinusoids import Bank, ring
 from studies.base.conditions import Record
 from studies.base.results import Results

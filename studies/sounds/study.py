@@ -20,7 +20,8 @@ SOUND = Study(
     title="An example of sound design",
     results="results:SoundResults",
     tables=(
-        *("designs", "frequencies", "truth", "nearness", "distances", "checks", "reach"),
+        *("designs", "frequencies", "truth", "nearness", "distances", "loudness"),
+        *("checks", "reach"),
         *("amplitudes", "optimisers", "evaluation", "provenance"),
     ),
     file="{example}/page.html",

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from carillon.fem.model import RIGID_MODES
 from sound.design.objective import fall
 from sound.design.pitch import bark, cents, common_factor
+from sound.levels import decibels, relative_loudness
 from sound.project.design import Design
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis import spectral_distance
 from studies.base.conditions import ONE_COLD_RUN, measured
 from studies.base.table import Column, Row, hidden, table
-from studies.sounds.results import SoundResults
+from studies.sounds.results import CLIPS, SoundResults
 
 Array = NDArray[np.float64]
 
@@ -175,6 +176,32 @@ def distances(results: SoundResults) -> Iterator[Row]:
             for state, sound in sounds.items()
         }
         yield {"point": name, **apart}
+
+
+@table(
+    Column("point", "Struck point"),
+    Column("clip", "Clip [LUFS]", "fraction", "LUFS"),
+    Column("before", "Before [LU]", "fraction", "LU"),
+    Column("after", "After [LU]", "fraction", "LU"),
+    Column("fine", "After, fine model [LU]", "fraction", "LU"),
+    Column("peak", "Peak after [dBFS]", "fraction", "dBFS"),
+)
+def loudness(results: SoundResults) -> Iterator[Row]:
+    """Integrated loudness of the clips (ITU-R BS.1770), and how much louder a strike of 1 N s is,
+    over the length that both have in common, as it is written."""
+    for name in results.design.targets.names:
+        clip, own = results.sound(CLIPS, name)
+        row: dict[str, float] = {}
+        for state in ("before", "after", "fine"):
+            sound, rate = results.sound(state, name)
+            seconds = min(len(clip) / own, len(sound) / rate)
+            ours, theirs = (
+                relative_loudness(samples[: round(seconds * hertz)], hertz)
+                for samples, hertz in ((sound, rate), (clip, own))
+            )
+            row[state] = ours - theirs
+        peak = decibels(float(np.abs(results.sound("after", name)[0]).max()))
+        yield {"point": name, "clip": relative_loudness(clip, own), "peak": peak, **row}
 
 
 @table(

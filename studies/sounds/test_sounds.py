@@ -275,6 +275,13 @@ def test_silence_is_farther_from_a_clip_than_what_is_known_of_it(results):
         assert row["modes"] < row["silence"]
 
 
+def test_loudness_is_told_beside_that_of_the_clip(results):
+    """The clips of this example are the sounds themselves."""
+    for row in tables.loudness(results).rows:
+        assert [row[state] for state in ("before", "after", "fine")] == [0.0, 0.0, 0.0]
+        assert -40.0 < row["clip"] < 10.0
+
+
 @pytest.mark.parametrize("listed", [index.Examples, index.OfRecordings])
 def test_the_index_leads_to_the_page(results, built, tmp_path, listed):
     examples = SimpleNamespace(

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
+from sound.outputs import WavOptions
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
+    from sound.levels import SoundLevel
     from sound.scenes.performance import Performance
     from sound.scenes.scene import Scene
 
@@ -55,12 +57,18 @@ class SceneOptions:
     notes: str | None = option(
         None, f"of {BARS}: names of notes, such as 'C6 E6 G6'", metavar="NOTES"
     )
+    raw: bool = option(
+        False,
+        "samples as they are computed, even beyond full scale, which is that of the scene, or 1 Pa "
+        "for auto, and without a fade",
+    )
     json: bool = option(False, "print what happened as JSON")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser, SceneOptions, positional=("scene",))
+    add_options(parser, WavOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -70,13 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
     _require_outputs(options, scene)
     from sound.scenes.playing.play import perform
 
-    performance = perform(scene)
-    _write(options, performance)
+    performance = perform(scene, raw=options.raw)
+    _write(options, collect(WavOptions, arguments), performance)
     summary = _summary(options, performance)
     if options.json:
         print(json.dumps(summary))
     else:
-        print(_sentence(summary), *_pitches(performance), sep="\n")
+        print(_sentence(summary, performance.level), *_pitches(performance), sep="\n")
     return 0
 
 
@@ -110,10 +118,11 @@ def _require_outputs(options: SceneOptions, scene: Scene) -> None:
         seen[path] = name
 
 
-def _write(options: SceneOptions, performance: Performance) -> None:
+def _write(options: SceneOptions, wav: WavOptions, performance: Performance) -> None:
     from sound.clips.wav import write_wav
 
-    write_wav(options.out, performance.sound, performance.rate)
+    sound, rate = performance.sound, performance.rate
+    write_wav(options.out, sound, rate, bits=wav.bits, seed=wav.dither_seed)
     if options.impacts is not None:
         from sound.scenes.performance import write_impacts
 
@@ -158,6 +167,7 @@ def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
         "timings": performance.timings,
         "full_scale_pascal": 1.0 / performance.scale,
         "full_scale_decibels": 20.0 * log10(1.0 / performance.scale / 2e-5),
+        **({} if performance.level is None else performance.level.as_dict()),
     }
 
 
@@ -194,10 +204,10 @@ def _listed(names: list[str]) -> str:
     return f"{', '.join(names[:NAMED])}{rest}"
 
 
-def _sentence(summary: dict[str, Any]) -> str:
+def _sentence(summary: dict[str, Any], level: SoundLevel | None) -> str:
     files = [name for name in summary["files"].values() if name is not None]
     return (
         f"{', '.join(files)}: {summary['seconds']:.4g} s, {summary['objects']} objects with "
         f"{summary['modes']} modes, {summary['impacts']:,} impacts; full scale is "
-        f"{summary['full_scale_pascal']:.3g} Pa"
+        f"{summary['full_scale_pascal']:.3g} Pa{'' if level is None else f'; {level.in_words()}'}"
     )

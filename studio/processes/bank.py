@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array
 from sound.clips.targets import Targets
 from sound.design.pitch import bark, cents, rms_off_partials
+from sound.rendering.clip_level import clip_level
 from sound.rendering.listening import near_weights
 from sound.rendering.solid import struck_amplitudes
 from studio.binary import pack
@@ -57,11 +58,11 @@ def bank(heard: Heard, positions: Array, aim: Aim | None, header: dict[str, Any]
         gains = gains * (LOUDEST / loudest if loudest > 0.0 else 0.0)
     else:
         targets, target_hertz = aim.targets, aim.targets.frequencies
-        loudness = targets.amplitudes.max(axis=1) / gains[aim.vertices].max(axis=1)
-        weights = near_weights(positions[aim.vertices], positions)
-        gains = gains * (weights @ loudness)[:, None]
-        struck = gains[aim.vertices]
         dampings = targets.dampings if dampings is None else dampings
+        level = clip_level(targets, hertz, dampings, gains[aim.vertices])
+        weights = near_weights(positions[aim.vertices], positions)
+        gains = gains * (weights @ level.gains)[:, None]
+        struck = gains[aim.vertices]
         errors = {
             "targets": list(targets.names),
             "wanted_hertz": target_hertz.tolist(),

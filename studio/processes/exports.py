@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from carillon.errors import UserError
-from solver.response.response import SAMPLE_RATE_HERTZ
 from sound.clips.wav import write_wav
 from sound.export.engine_folder import write_engine_folder, zipped
 from sound.export.formats import export_design
@@ -11,7 +10,8 @@ from sound.export.sound_set_options import SoundSetOptions
 from sound.project.design import Design
 from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
-from sound.rendering.render import Hit, render, ringing_seconds
+from sound.rendering.render import Hit
+from sound.rendering.rendered_sound import render_sound
 from sound.rendering.solid import SoundingSolid
 
 
@@ -51,5 +51,5 @@ def _write_strike(design: Design, target: str | None, out: str) -> None:
     solid = SoundingSolid.of_design(design)
     hit = Hit(0.0, strike.position, strike.inward)
     listening = Listening.of_design(design, solid)
-    sound = render(solid, [hit], ringing_seconds(solid), listening=listening)
-    write_wav(out, sound, SAMPLE_RATE_HERTZ)
+    sound = render_sound(solid, [hit], listening=listening)
+    write_wav(out, sound.samples, sound.rate)

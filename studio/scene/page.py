@@ -10,6 +10,7 @@ from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
+from sound.levels import dithered
 from sound.scenes.expected_cents import in_cents
 from sound.scenes.performance import GROUND, Appearance, Impact, Performance, Voice
 from studio.binary import pack
@@ -101,11 +102,13 @@ def content(performance: Performance) -> bytes:
 
 
 def flac(sound: Array, rate: int) -> bytes:
-    """A file of samples (s, 2) [full scale] of 24 bits; what is beyond full scale is cut off."""
+    """A file of samples (s, 2) [full scale] of 24 bits, with dither; what is beyond full scale is
+    cut off."""
     import soundfile
 
     file = io.BytesIO()
-    soundfile.write(file, sound, rate, format="FLAC", subtype="PCM_24")
+    # libsndfile takes the upper bits of whole numbers of 32 bits.
+    soundfile.write(file, dithered(sound, 24) << 8, rate, format="FLAC", subtype="PCM_24")
     return file.getvalue()
 
 

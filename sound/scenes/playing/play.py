@@ -9,6 +9,7 @@ from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.processes.threads import allowed_threads, blas_threads
+from sound.levels import FULL, SoundLevel, decibels, end_dbfs, faded
 from sound.scenes.audible.hearing import Head
 from sound.scenes.audible.loudness import voice
 from sound.scenes.bodies import Body, bodies_of, with_modes
@@ -18,8 +19,6 @@ from sound.scenes.performance import Appearance, Camera, Motion, Performance, Pi
 from sound.scenes.playing.scene_sound import SceneSound, gains_of, sustained_forces
 from sound.scenes.scene import CameraEntry, ListenerEntry, Scene
 
-FULL = 0.99
-"""Largest magnitude of a sound that is scaled to full scale; rounding does not take it to 1."""
 FROM = np.array([0.25, -1.0, 0.42]) / np.linalg.norm([0.25, -1.0, 0.42])
 """Unit vector to the camera: in front, a little to the right and above."""
 _RIGHT = np.cross([0.0, 0.0, 1.0], FROM) / np.hypot(FROM[0], FROM[1])
@@ -35,8 +34,13 @@ are left out."""
 
 
 @blas_threads(1)
-def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> Performance:
+def perform(
+    scene: Scene, threads: int | None = None, visible: bool = True, raw: bool = False
+) -> Performance:
     """Play a scene from its beginning to its end, and show progress if `visible`.
+
+    The sound is kept within full scale, and fades where it ends above -60 dBFS, unless it is `raw`:
+    full scale is then what the scene says, 1 Pa for `auto`.
 
     The result is the same, bit for bit, on any number of threads, which is that of the cores if
     None.  Raises UserError if an object is unusable, two overlap at the start, or nothing touches
@@ -76,7 +80,10 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     )
     sound = player.together(threads)
     clock.lap("sound")
-    scale = _scale(settings.full_scale, float(np.abs(sound).max(initial=0.0)))
+    scale = _scale(settings.full_scale, float(np.abs(sound).max(initial=0.0)), raw)
+    sound *= scale
+    end = end_dbfs(sound, settings.rate)
+    sound, fade = faded(sound, settings.rate, 0.0 if raw else None)
     voices = [
         None if body.solid is None else voice(body, scale * gains)
         for body, gains in zip(bodies, player.gains)
@@ -95,7 +102,7 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
     return Performance(
         scene.title,
         Picture(surfaces, course.motion, scene.ground, camera),
-        scale * sound,
+        sound,
         settings.rate,
         [each.impact for each in impacts],
         voices,
@@ -103,6 +110,7 @@ def perform(scene: Scene, threads: int | None = None, visible: bool = True) -> P
         clock.seconds,
         [body.accuracy for body in bodies],
         {bodies[number].entry.name: way.tolist() for number, way in course.moved.items()},
+        SoundLevel.of(sound, settings.rate, end, fade),
     )
 
 
@@ -120,8 +128,10 @@ class Clock:
         self._last = now
 
 
-def _scale(full_scale: float | Literal["auto"], peak: float) -> float:
+def _scale(full_scale: float | Literal["auto"], peak: float, raw: bool) -> float:
     """Full scale per pascal, from the pressure [Pa] of full scale and of the loudest sample."""
+    if raw:
+        return 1.0 if full_scale == "auto" else 1.0 / full_scale
     if peak == 0.0:
         return 1.0
     if full_scale == "auto":
@@ -129,8 +139,7 @@ def _scale(full_scale: float | Literal["auto"], peak: float) -> float:
     if peak > FULL * full_scale:
         say(
             f"the loudest sample has {peak:.3g} Pa, more than full_scale ({full_scale:g} Pa): all "
-            f"is {20.0 * np.log10(peak / (FULL * full_scale)):.1f} dB fainter, so that "
-            "nothing clips"
+            f"is {decibels(peak / (FULL * full_scale)):.1f} dB fainter, so that nothing clips"
         )
         return FULL / peak
     return 1.0 / full_scale
