@@ -165,6 +165,7 @@ def struck_surface(
     unit: float = 1.0,
     parts_of: Callable[[Array, Index], Index] | None = None,
     wall: WallSize | None = None,
+    up: str | None = None,
 ) -> Surface:
     """Surface of a mesh in metres, without edges above `LONGEST_EDGE` of its longest side.
 
@@ -172,14 +173,14 @@ def struck_surface(
     counts.
 
     The mesh's own vertices come first and keep their numbers; `carillon.fem.geometry.load_surface`
-    describes it and its unit.  Of a `wall` it is both sides, and these vertices are on the outer
+    describes it, its unit and the axis `up`.  Of a `wall` it is both sides, and these vertices are on the outer
     one. Raises UserError if there is no such mesh.
     """
     import trimesh
 
     from carillon.fem.geometry import load_surface
 
-    surface = load_surface(mesh, unit) if wall is None else wall.read(mesh, unit).skin
+    surface = load_surface(mesh, unit, up=up) if wall is None else wall.read(mesh, unit, up).skin
     side = longest_side(surface)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
     cut = _cut(vertices, faces, LONGEST_EDGE * side)

@@ -63,6 +63,8 @@ def attributes_of(
     }
     if solid.wall is not None:
         attributes |= {"wall": solid.wall, "wall_side": solid.wall_side}
+    if solid.up is not None:
+        attributes["up"] = solid.up
     if solver.tolerance is not None:
         attributes["tolerance"] = solver.tolerance
     return attributes

@@ -37,9 +37,9 @@ class WallSize:
         """The wall of a surface, see `Wall.of_surface`."""
         return Wall.of_surface(surface, self.thickness, self.side, name)
 
-    def read(self, mesh: str, unit: float = 1.0) -> Wall:
+    def read(self, mesh: str, unit: float = 1.0, up: str | None = None) -> Wall:
         """The wall of the surface in a file, or `builtin:NAME`, see `load_surface`."""
-        return self.of(load_surface(mesh, unit, is_sheet=True), surface_name(mesh))
+        return self.of(load_surface(mesh, unit, is_sheet=True, up=up), surface_name(mesh))
 
 
 @dataclass(frozen=True, eq=False)
