@@ -173,8 +173,8 @@ def struck_surface(
     counts.
 
     The mesh's own vertices come first and keep their numbers; `carillon.fem.geometry.load_surface`
-    describes it, its unit and the axis `up`.  Of a `wall` it is both sides, and these vertices are on the outer
-    one. Raises UserError if there is no such mesh.
+    describes it, its unit and the axis `up`.  Of a `wall` it is both sides, and these vertices are
+    on the outer one. Raises UserError if there is no such mesh.
     """
     import trimesh
 

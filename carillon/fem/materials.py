@@ -57,8 +57,8 @@ def young_modulus(
     A file holds one value per cell, or is a mesh of volume elements or an image (.vti) with Young's
     moduli: then each cell has that of the element in which its middle lies, or which is nearest.
     Raises UserError if there is no such file, for what `carillon.fem.moduli` refuses, or if a mesh
-    or an image is elsewhere than the cells. `unit`: metres per unit of its coordinates, whose axis `up`
-    is turned to z.
+    or an image is elsewhere than the cells. `unit`: metres per unit of its coordinates, whose axis
+    `up` is turned to z.
 
     Examples
     --------

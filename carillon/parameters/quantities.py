@@ -91,6 +91,17 @@ def _unit(value: Any) -> Any:
     return LENGTHS[value.strip()]
 
 
+def unit_in_words(metres: float) -> str | float:
+    """Name of a unit of so many metres; the number if it has none.
+
+    Examples
+    --------
+    >>> unit_in_words(0.001), unit_in_words(0.3048)
+    ('mm', 0.3048)
+    """
+    return next((name for name, each in LENGTHS.items() if each == metres), metres)
+
+
 def _reachable(tolerance: float) -> float:
     if 0.0 < tolerance < LEAST_TOLERANCE:
         raise ValueError(

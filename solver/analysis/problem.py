@@ -206,7 +206,7 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     if surface is None:
         surface = SolidSurface.read(options.mesh, options.unit, options.wall_size, options.up)
     mesh, covering = discretised(surface, options)
-    surface.say_doubts()
+    surface.hints.say_size_and_filling()
     meshed = time.perf_counter()
     label = f"mesh '{surface.name}', resolution {options.resolution}"
     young = young_modulus(options.material, mesh, options.seed, label, options.unit, options.up)

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 from carillon.arrays import Surface
-from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.composition.entries import describes_regions, joined_surface, read_composition
 from carillon.errors import UserError
 from carillon.fem.geometry import load_surface, surface_name
-from carillon.fem.geometry.open_surfaces import say_filled
-from carillon.fem.geometry.size import doubt_unit
+from carillon.fem.geometry.hints import MeshHints
 from carillon.fem.geometry.walls import Wall, WallSize
 
 
@@ -63,8 +61,8 @@ class SolidSurface:
         """Sides (3,) of the bounding box [m]."""
         return tuple(float(side) for side in self.solid.extents)
 
-    def say_doubts(self) -> None:
-        """Log hints, each once: if the unit seems mistaken, and if an open mesh is filled."""
-        doubt_unit(self.mesh, self.extents, self.unit)
-        if self.wall is None and not self.mesh.startswith(BUILTIN_PREFIX):
-            say_filled(self.mesh, self.triangles)
+    @property
+    def hints(self) -> MeshHints:
+        """What may be otherwise than the mesh was opened."""
+        is_wall = self.wall is not None
+        return MeshHints.of(self.mesh, self.triangles, self.unit, self.up, is_wall)

@@ -53,7 +53,7 @@ class StreamedModes:
     """Displacements (n, 3) of the modes from one to before another, counted from 0."""
     wall: WallSize | None = None
     up: str | None = None
-    """The wall that the solid is, and the axis of its mesh that was turned to z; see `ModesFile`."""
+    """The wall that the solid is, and the axis of its mesh that became z; see `ModesFile`."""
 
     @classmethod
     def of_file(cls, path: str | Path) -> "StreamedModes":

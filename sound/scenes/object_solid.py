@@ -1,5 +1,6 @@
 """The solid of a scene's object: of a design, a modes file, a mesh or a ball."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,7 +56,7 @@ class ObjectSolid:
     is one."""
     sounding: SoundingSolid | None
     mesh: str = ""
-    """str: name of the mesh file that the solid was made from, empty if there is none."""
+    """str: name of the mesh file whose axes the solid has, empty if there is none."""
     listening: Listening | None = None
     radius: float | None = None
     """float [m] or None: radius of a ball, None for any other solid."""
@@ -99,7 +100,7 @@ def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
         touched.materials,
         touched.which,
         sounding,
-        design.settings.get("mesh", ""),
+        _file_axes(design.settings),
         Listening.of_design(design, sounding),
         volume=_volume(design.model),
         is_held=design.model.rigid_modes < RIGID_MODES,
@@ -128,7 +129,7 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
         touched.materials,
         touched.which,
         _heard(entry, heard),
-        file.attributes.get("mesh", ""),
+        _file_axes(file.attributes),
         accuracy=accuracy or None,
         volume=_volume(file.model),
         is_held=file.model.rigid_modes < RIGID_MODES,
@@ -151,6 +152,11 @@ def _heard(entry: ObjectEntry, file: ModesFile) -> SoundingSolid:
 
 def _volume(model: Solid) -> float | None:
     return None if model.region is None and model.supports is None else model.mass / model.density
+
+
+def _file_axes(described: Mapping[str, Any]) -> str:
+    """Name of the mesh file whose axes a design or a modes file has; empty if they were turned."""
+    return "" if described.get("up") else described.get("mesh", "")
 
 
 def _of_kind(path: str, expected: str) -> str:

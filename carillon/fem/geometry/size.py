@@ -86,7 +86,8 @@ def unit_hint(extents: Sequence[float], unit: float) -> str | None:
 def likely_units(extents: Sequence[float], unit: float) -> dict[str, float]:
     """Other units that a mesh may be in, as metres by their names, the likeliest first.
 
-    None at all if its sides [m] are usual ones. `unit`: metres per unit of the mesh, as it was given.
+    None at all if its sides [m] are usual ones. `unit`: metres per unit of the mesh, as it was
+    given.
 
     Examples
     --------

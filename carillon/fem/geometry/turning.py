@@ -1,8 +1,20 @@
 """Surfaces turned so that an axis of their file points up, which is z."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
 from carillon.arrays import Array, Surface
+
+Y_UP = (".gltf", ".glb")
+"""Endings of mesh files whose y points up (glTF 2.0, section 3.4)."""
+UNTOLD = (".obj", ".off", ".ply", ".stl")
+"""Endings of mesh files that say nothing of what points up."""
+STANDS = 0.02
+"""Part of a height that a solid may reach below 0 along the axis that it stands on 0 of."""
+HANGS = 0.25
+"""Part of a height on each side of 0 from which a solid does not stand on 0."""
 
 _ROTATIONS = {
     "x": ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
@@ -67,3 +79,36 @@ def turned_upright(surface: Surface, up: str | None) -> Surface:
         return surface
     vertices = turned_points(np.asarray(surface.vertices), up)
     return type(surface)(vertices, np.asarray(surface.faces), process=False)
+
+
+def up_of_format(mesh: str) -> str | None:
+    """Axis that points up in files of a mesh's format; None if the format does not say.
+
+    Examples
+    --------
+    >>> up_of_format("bar.GLB"), up_of_format("bar.obj")
+    ('y', None)
+    """
+    return "y" if Path(mesh).suffix.lower() in Y_UP else None
+
+
+def likely_up(mesh: str, bounds: Sequence[Sequence[float]] | Array) -> str | None:
+    """`y` if a mesh seems to stand on y = 0, as it was made where y points up; None if not.
+
+    It begins at y = 0 and lies on both sides of z = 0. Of formats that say what points up, and of
+    built-in objects, nothing is guessed. `bounds` (2, 3): of the mesh in its file's axes.
+
+    Examples
+    --------
+    >>> likely_up("teapot.obj", [[-3.0, 0.0, -2.0], [3.4, 3.15, 2.0]])
+    'y'
+    >>> likely_up("teapot.obj", [[-3.0, -2.0, 0.0], [3.4, 2.0, 3.15]]) is None
+    True
+    """
+    if Path(mesh).suffix.lower() not in UNTOLD:
+        return None
+    low, high = np.asarray(bounds, dtype=float)
+    height = high - low
+    stands = low[1] >= -STANDS * height[1]
+    hangs = low[2] <= -HANGS * height[2] and high[2] >= HANGS * height[2]
+    return "y" if stands and hangs else None
