@@ -9,6 +9,7 @@ import numpy as np
 from carillon.arrays import Array, Index, Surface
 from carillon.command_line.progress import say
 from carillon.errors import UserError
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.geometry.walls import WallSize
 from solver.response.vertices import inward_normals
 
@@ -129,8 +130,8 @@ def _nearest_vertex(surface: Surface, name: str, at: Array, unit: float) -> tupl
     nearest, distance = int(used[np.argmin(away)]), float(away.min())
     if off > OFF_SURFACE * side or distance > OFF_VERTEX * side:
         say(
-            f"{point} is {off:.3g} m off the surface; the nearest vertex {nearest} at "
-            f"{_shown(vertices[nearest] / unit, unit)} is struck, {distance:.3g} m away"
+            f"{point} is {length_in_words(off)} off the surface; the nearest vertex {nearest} at "
+            f"{_shown(vertices[nearest] / unit, unit)} is struck, {length_in_words(distance)} away"
             f"{_other_unit(surface, unit * at)}"
         )
     return nearest, distance

@@ -108,7 +108,7 @@ def test_modes_of_a_sheet_with_a_wall_are_those_of_the_plate(sheet, plate, tmp_p
         (["--wall", "2 mm"], "found a wall of voxels, expected finite cells"),
         (["--wall", "2 mm", "--discretisation", "voxel"], "add --discretisation finite-cell"),
         (["--wall", "9 um", *"--discretisation finite-cell".split()], "expected at least 0.01 of"),
-        (["--wall", "3", *"--discretisation finite-cell".split()], "longest side is 0.2 m"),
+        (["--wall", "3", *"--discretisation finite-cell".split()], "longest side is 20 cm"),
         (["--discretisation", "finite-cell"], "is flat, .* such as a wall with finite cells"),
     ],
 )

@@ -22,6 +22,8 @@ from solver.refinement.errors import (
 
 REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
 """Words for what is counted as refined."""
+LOWEST_HEARD = 20.0
+"""Lowest frequency that is heard [Hz]."""
 EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
 """Words for the expected errors."""
 
@@ -100,6 +102,8 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
         f"{attributes['residual_max']:.1e}, orthogonal to {attributes['orthogonality']:.1e}, "
         f"{total:.1f} s on {attributes['ranks']} rank{'s' if attributes['ranks'] > 1 else ''}"
     )
+    if len(elastic) and elastic[-1] < LOWEST_HEARD:
+        print(f"all modes are below hearing ({LOWEST_HEARD:g} Hz); see the size and its unit")
     if attributes["method"] == "hcms" and "corrections" not in attributes:
         print(UNCORRECTED)
     if attributes.get("inertia_count", -1) == attributes.get("inertia_expected"):

@@ -45,9 +45,24 @@ def lengths_in_words(lengths: Sequence[float]) -> str:
     >>> lengths_in_words([0.4, 0.1, 0.0005]), lengths_in_words([0.0021])
     ('40 x 10 x 0.05 cm', '2.1 mm')
     """
-    longest = max(lengths)
-    unit = next(name for name, least in _SHOWN if longest >= least)
+    unit = _unit_of(max(lengths))
     return f"{' x '.join(f'{side / LENGTHS[unit]:.4g}' for side in lengths)} {unit}"
+
+
+def length_in_words(length: float) -> str:
+    """A length [m] in the unit that suits it, to three digits.
+
+    Examples
+    --------
+    >>> length_in_words(0.00127), length_in_words(12.345)
+    ('1.27 mm', '12.3 m')
+    """
+    unit = _unit_of(length)
+    return f"{length / LENGTHS[unit]:.3g} {unit}"
+
+
+def _unit_of(length: float) -> str:
+    return next((name for name, least in _SHOWN if length >= least), "m")
 
 
 def doubt_unit(mesh: str, extents: Sequence[float], unit: float) -> None:
