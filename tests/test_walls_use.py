@@ -174,8 +174,8 @@ def test_a_project_strikes_the_skin_of_its_wall(sheet, tmp_path):
 
 
 def test_the_studio_shows_the_skin_of_a_wall(sheet):
-    news = SolidProcess().read(sheet, 1.0, WallSize(0.002), 1)
-    assert news.vertices > 8 and news.longest_side_m == pytest.approx(0.2)
+    news = SolidProcess().read(sheet, 1.0, WallSize(0.002), None, 1)
+    assert news.vertices > 8 and max(news.hints.extents) == pytest.approx(0.2)
     rows = {"regions": [{"name": "top", "material": "tin", "where": "z > 0"}], "supports": []}
     _, faults = PlacingProcess().place(sheet, 1.0, rows, WallSize(0.002), None, Path(), 1)
     assert not faults

@@ -57,8 +57,8 @@ class Surface:
             kind = "solid" if self.nodes is None else "voxels"
             raise UserError(
                 f"{what}: the point ({_shown(point)}) m is {length_in_words(distance)} from the "
-                f"surface of the {kind}, expected at most {length_in_words(reach)}; the nearest one is "
-                f"({_shown(self.points[index])}) m"
+                f"surface of the {kind}, expected at most {length_in_words(reach)}; the nearest "
+                f"one is ({_shown(self.points[index])}) m"
             )
         return int(index)
 

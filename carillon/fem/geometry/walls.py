@@ -96,8 +96,8 @@ class Wall:
         if not thickness <= longest:
             raise UserError(
                 f"{what}: found a wall of {length_in_words(thickness)} about a surface whose "
-                f"longest side is {length_in_words(longest)}, expected less; see whether both are in "
-                "the right unit"
+                f"longest side is {length_in_words(longest)}, expected less; see whether both "
+                "are in the right unit"
             )
         sheets = Sheets.of_surface(vertices, faces)
         if sheets.is_closed and sheets.volume < 0.0:
