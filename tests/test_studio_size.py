@@ -145,7 +145,7 @@ def test_the_page_shows_the_size_and_mends_it_by_a_press_each(browser, tmp_path,
         page.get_by_role("button", name="Undo").click()
         so(page, "studio.state.current.settings.wall === null")
         panel.get_by_text("Unit, up axis, wall").click()
-        panel.get_by_label("In the mesh, up is").select_option("z")
+        panel.get_by_label("Up axis", exact=True).select_option("z")
         so(page, "studio.state.current.settings.up === null")
         assert np.allclose(page.evaluate("studio.state.current.settings.unit"), 0.001)
         page.context.close()

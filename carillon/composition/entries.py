@@ -98,7 +98,9 @@ class RegionEntry:
     label: Annotated[str, Within(min_length=1, max_length=100)] | None = option(
         None, "name or number of its label in that file"
     )
-    unit: MetresPerUnit = option(1.0, "metres per unit of its mesh or labels [m]")
+    unit: MetresPerUnit = option(
+        1.0, "unit of its mesh or labels: m, cm, mm, um or in, or a number [m]"
+    )
     painted: Paint | None = option(
         None,
         "places of the surface, x, y, z, and the radius about each that is painted [m]: what is "

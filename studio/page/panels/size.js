@@ -54,13 +54,14 @@ export function makeSize(element, parts) {
     "details",
     { class: "more" },
     make("summary", {}, "Unit, up axis, wall"),
-    pair("One unit of the mesh is a", unit),
-    pair("In the mesh, up is", up),
+    pair("Unit", unit),
+    pair("Up axis", up),
     pair("Wall [mm]", wall),
     make(
       "p",
       { class: "hint" },
-      "A wall of this thickness follows the surface, open or closed, in place of what it surrounds.",
+      "Unit and up axis are those of the mesh file: up becomes z. A wall follows the surface, open or closed, " +
+        "in place of what it surrounds.",
     ),
   );
   const none = make("p", { class: "hint" }, "Open a solid first.");
@@ -76,7 +77,8 @@ export function makeSize(element, parts) {
     const found = [];
     if (solid.units.length > 0) {
       const silent = heard.surface === solid.surface && heard.hertz < LOWEST_HEARD;
-      const says = `It is ${lengths([solid.longest_side_m])} long${silent ? ", all its modes are below hearing" : ""}:`;
+      const heardOf = silent ? ", all its modes are below hearing" : "";
+      const says = `It is ${lengths([solid.longest_side_m])} long${heardOf}. Or is its mesh in`;
       const buttons = solid.units.map(({ name, metres, longest_m }) =>
         button(`${PLURALS[name] ?? name}? (${lengths([longest_m])})`, () => change({ unit: metres })),
       );
