@@ -183,6 +183,11 @@ def test_an_open_mesh_is_said_to_be_filled_and_a_shell_proposed(bowl, caplog):
     assert not hints(caplog)
 
 
+def test_nothing_is_said_of_a_built_in_object(caplog):
+    build_problem(ProblemOptions("builtin:bell", 12, unit=0.01))
+    assert not hints(caplog)
+
+
 def test_nothing_is_said_of_bodies_that_touch_or_a_face_that_is_there_twice(tmp_path, caplog):
     touching = trimesh.util.concatenate([BOX, block((0.2, 0.0, -0.05), (0.4, 0.02, 0.05))])
     twice = trimesh.Trimesh(BOX.vertices, np.concatenate([BOX.faces, BOX.faces[:1]]), process=False)

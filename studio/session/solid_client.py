@@ -9,7 +9,6 @@ from carillon.errors import UserError
 from carillon.fem.geometry.hints import MeshHints
 from carillon.fem.geometry.surface import surface_name
 from carillon.fem.geometry.walls import WallSize
-from solver.analysis.problem import ProblemOptions
 from sound.project.project import Project
 from sound.strikes import Place, Strike
 from studio.processes.worker import Worker
@@ -119,7 +118,7 @@ class SolidClient:
         try:
             project = document.solid(self._folder)
             solid, material = project.solid, project.material
-            await self._bring_surface(document.mesh, solid)
+            await self._bring_surface(document.mesh, project)
             await self._bring_voxels(solid, material, project.composition)
         except UserError as error:
             self._tell(phase="failed", message=str(error), progress=None)
@@ -132,7 +131,8 @@ class SolidClient:
         """Call the process, see `studio.processes.solid.SolidProcess`."""
         return await self._worker.call(name, *arguments)
 
-    async def _bring_surface(self, mesh: str, solid: ProblemOptions) -> None:
+    async def _bring_surface(self, mesh: str, project: Project) -> None:
+        solid = project.solid
         how = solid.unit, solid.wall_size, solid.up
         wanted = mesh, *how
         if self._read == wanted:

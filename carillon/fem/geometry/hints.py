@@ -71,7 +71,7 @@ class MeshHints:
 
     def say_size_and_filling(self) -> None:
         """Log what bears on the modes, each hint once: a doubtful unit, and an open surface."""
-        if hint := unit_hint(self.extents, self.unit):
+        if self.units and (hint := unit_hint(self.extents, self.unit)):
             self._say(hint)
         if self.shell is not None:
             thickness = lengths_in_words([self.shell]).replace(" ", "")
