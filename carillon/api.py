@@ -57,6 +57,7 @@ from carillon.parameters.quantities import (
     Resolution,
     Seed,
     Tolerance,
+    UpAxis,
     WallSide,
     WallThickness,
     Workers,
@@ -105,6 +106,8 @@ class Mesh:
     """Metres per unit of that file."""
     wall: Wall | None = None
     """The wall that the solid is, of finite cells; None if it is what the surface encloses."""
+    up: str | None = None
+    """Axis of that file that points up, and was turned to z; None if the file's axes stayed."""
 
     @classmethod
     def of_triangles(
@@ -164,9 +167,10 @@ class Mesh:
 
 def load_mesh(
     path: str | Path,
-    unit: float = 1.0,
+    unit: float | str = 1.0,
     wall: float | str | None = None,
     wall_side: str = "about",
+    up: str | None = None,
 ) -> Mesh:
     """The surface in a mesh file, or `builtin:NAME`.
 
@@ -178,12 +182,14 @@ def load_mesh(
     Parameters
     ----------
     unit
-        Metres per unit of the file.
+        Unit of the file: `m`, `cm`, `mm`, `um`, `in`, or metres per unit.
     wall
         Thickness of a wall that follows the surface, open or closed, in place of what it encloses:
         a number [m], or a text such as `0.8 mm`. Walls are for finite cells.
     wall_side
         `about`, half of it on each side of the surface, or `inside` or `outside`.
+    up
+        Axis of the file that points up, such as `y`: the solid is turned so that it becomes z.
 
     Examples
     --------
@@ -194,9 +200,10 @@ def load_mesh(
         raise UserError(f"found {path!r:.80}, expected the path of a mesh file, or builtin:NAME")
     metres, size = checked("unit", unit, MetresPerUnit), _wall_size(wall, wall_side)
     name = surface_name(str(path))
-    surface = load_surface(str(path), metres, is_sheet=size is not None)
+    axis = None if up is None else checked("up", up, UpAxis)
+    surface = load_surface(str(path), metres, is_sheet=size is not None, up=axis)
     made = None if size is None else size.of(surface, name)
-    return Mesh(surface, name, str(path), metres, made)
+    return Mesh(surface, name, str(path), metres, made, axis)
 
 
 def _wall_size(wall: float | str | None, side: str) -> WallSize | None:
@@ -555,7 +562,7 @@ def solve(
         solid, modes=modes, initial_modes=start, comm=ranks, method=method, **options
     )
     evidence = {"method": method, **result.evidence, "timings": result.seconds}
-    evidence |= _wall_of(body, wall, wall_side)
+    evidence |= _wall_of(body, wall, wall_side) | _up_of(body)
     values = (result.eigenvalues, result.frequencies, result.residuals)
     return Solution(*values, _shapes(result.modes), solid, evidence)
 
@@ -1076,6 +1083,11 @@ def _wall_of(body: Body, wall: float | str | None, side: str) -> dict[str, Any]:
     return {} if own is None else {"wall": own.thickness, "wall_side": own.side}
 
 
+def _up_of(body: Body) -> dict[str, Any]:
+    """Axis of the mesh file that was turned to z, for the solid's file; nothing if none was."""
+    return {"up": body.up} if isinstance(body, Mesh) and body.up else {}
+
+
 def _composed(
     material: Material,
     body: Mesh | HexMesh,
@@ -1095,7 +1107,7 @@ def _composed(
         return Placed(None, ())
     frame = SolidFrame("", _surface(body), "mesh")
     if isinstance(body, Mesh):
-        frame = SolidFrame(body.path, body.skin, body.name, body.unit)
+        frame = SolidFrame(body.path, body.skin, body.name, body.unit, up=body.up)
     return compose(CompositionEntry(material.regions, held), frame, fixed)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from carillon.arrays import Array, Index, Surface
 from carillon.command_line.progress import say
 from carillon.errors import UserError
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.geometry.walls import WallSize
 from solver.response.vertices import inward_normals
 
@@ -129,8 +130,8 @@ def _nearest_vertex(surface: Surface, name: str, at: Array, unit: float) -> tupl
     nearest, distance = int(used[np.argmin(away)]), float(away.min())
     if off > OFF_SURFACE * side or distance > OFF_VERTEX * side:
         say(
-            f"{point} is {off:.3g} m off the surface; the nearest vertex {nearest} at "
-            f"{_shown(vertices[nearest] / unit, unit)} is struck, {distance:.3g} m away"
+            f"{point} is {length_in_words(off)} off the surface; the nearest vertex {nearest} at "
+            f"{_shown(vertices[nearest] / unit, unit)} is struck, {length_in_words(distance)} away"
             f"{_other_unit(surface, unit * at)}"
         )
     return nearest, distance
@@ -165,6 +166,7 @@ def struck_surface(
     unit: float = 1.0,
     parts_of: Callable[[Array, Index], Index] | None = None,
     wall: WallSize | None = None,
+    up: str | None = None,
 ) -> Surface:
     """Surface of a mesh in metres, without edges above `LONGEST_EDGE` of its longest side.
 
@@ -172,14 +174,14 @@ def struck_surface(
     counts.
 
     The mesh's own vertices come first and keep their numbers; `carillon.fem.geometry.load_surface`
-    describes it and its unit.  Of a `wall` it is both sides, and these vertices are on the outer
-    one. Raises UserError if there is no such mesh.
+    describes it, its unit and the axis `up`.  Of a `wall` it is both sides, and these vertices are
+    on the outer one. Raises UserError if there is no such mesh.
     """
     import trimesh
 
     from carillon.fem.geometry import load_surface
 
-    surface = load_surface(mesh, unit) if wall is None else wall.read(mesh, unit).skin
+    surface = load_surface(mesh, unit, up=up) if wall is None else wall.read(mesh, unit, up).skin
     side = longest_side(surface)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
     cut = _cut(vertices, faces, LONGEST_EDGE * side)

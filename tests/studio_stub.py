@@ -72,6 +72,10 @@ def solid_entry(surface: int, mesh: trimesh.Trimesh) -> dict[str, Any]:
         "voxels": 11085,
         "unknowns": 5619,
         "longest_side_m": float(mesh.extents.max()),
+        "extents_m": mesh.extents.tolist(),
+        "units": [],
+        "up": None,
+        "shell_m": None,
     }
 
 

@@ -212,7 +212,10 @@ MISTAKES = [
         lambda _: ca.solve("builtin:bar", ca.Material(regions=PAN, factor=[1.0, 2.0]), 8),
         r"factor: an array of shape \(2,\)",
     ),
-    (lambda _: ca.load_mesh("builtin:bar", unit="mm"), "unit: found 'mm', expected a number"),
+    (
+        lambda _: ca.load_mesh("builtin:bar", unit="ell"),
+        "unit: found 'ell', expected one of m, cm, mm",
+    ),
     (lambda _: ca.load_mesh(5), "found 5, expected the path of a mesh file"),
     (lambda _: ca.Mesh.of_triangles("a", "b", "it"), "it: could not convert"),
     (lambda _: ca.Material(density="heavy"), "density: found 'heavy', expected a number"),

@@ -414,7 +414,7 @@ def test_a_mesh_in_millimetres_is_told_to_be_metres_long(tmp_path, caplog, endin
     for _ in range(2):
         assert build_problem(ProblemOptions(str(path), 8)).extents == (400.0, 100.0, 100.0)
     (said,) = [record.message for record in caplog.records]
-    assert "400 x 100 x 100 m" in said and "--unit 0.001" in said
+    assert "400 m long" in said and "--unit mm) it is 40 cm" in said
     caplog.clear()
     build_problem(ProblemOptions(str(path), 8, unit=0.001))
     assert not caplog.records
@@ -427,7 +427,7 @@ def test_a_mesh_in_metres_is_not_taken_for_millimetres(tmp_path, caplog):
     assert not caplog.records
     build_problem(ProblemOptions(str(path), 8, unit=0.001))
     (said,) = [record.message for record in caplog.records]
-    assert "0.0004 x 0.0001 x 0.0001 m" in said and "--unit 1" in said
+    assert "0.4 mm long" in said and "--unit m) it is 40 cm" in said
 
 
 def test_what_is_refused_is_refused_in_one_sentence(tmp_path, caplog):

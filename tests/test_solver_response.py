@@ -226,7 +226,7 @@ def test_a_place_outside_finite_cells_is_taken_to_the_nearest_inside(tilted, cap
         assert np.linalg.norm(outside.position - middle) < 0.2 * file.mesh.edge
         assert outside.inward @ normal < -0.99
         (said,) = caplog.messages
-        assert "strike: the point" in said and "m off the surface" in said
+        assert "strike: the point" in said and " off the surface" in said
         with pytest.raises(UserError, match="from the surface of the solid"):
             choose_contacts(file, strike=middle + 0.1 * normal)
 

@@ -228,7 +228,7 @@ def test_a_point_is_named_in_the_coordinates_of_the_mesh(tmp_path, capsys):
     summary = json.loads(said.out)
     assert summary["position_m"] == corner.tolist()
     assert summary["distance_m"] == pytest.approx(0.05)
-    assert "is 0.05 m off the surface" in said.err
+    assert "is 5 cm off the surface" in said.err
 
 
 def test_partials_of_a_rendered_file_are_the_modes(tmp_path, capsys):
@@ -265,7 +265,7 @@ def test_the_solver_s_modes_can_be_heard(tmp_path, capsys):
     assert run([*words[:2], "--at", 0, 0, -0.1, *words[6:]]) == 0
     moved = capsys.readouterr()
     assert json.loads(moved.out)["position_m"] == printed["position_m"]
-    assert "is 0.1 m off the surface" in moved.err
+    assert "is 10 cm off the surface" in moved.err
     decay = Damping(5.0, 2e-7).decay_per_second(result.eigenvalues[RIGID_MODES:])
     np.testing.assert_allclose(printed["dampings_per_second"], decay)
     np.testing.assert_allclose(

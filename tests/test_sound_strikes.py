@@ -101,7 +101,7 @@ def test_a_point_off_the_surface_is_moved_to_it_and_that_is_told(capsys):
     assert np.allclose(strike.position, (0.0, 0.0, 0.1), atol=1e-2)
     assert strike.distance == pytest.approx(np.linalg.norm(strike.position - (0, 0, 0.15)))
     (line,) = capsys.readouterr().err.splitlines()
-    assert "'top': the point (0, 0, 0.15) m is 0.05 m off the surface" in line
+    assert "'top': the point (0, 0, 0.15) m is 5 cm off the surface" in line
     assert f"vertex {strike.vertex} at" in line and "unit" not in line
 
 

@@ -185,7 +185,7 @@ def test_the_expected_error_of_held_cells_is_about_theirs():
         (held("z > 1"), "meets nothing of solid 'mesh', which has -0.1 <= x <= 0.1"),
         (held("z > 1", spring=np.array(1.0)), "meets nothing"),
         (held("z > -1"), "nothing is left that vibrates"),
-        (Support("far", point=(1.0, 0.0, 0.0)), "is 0.9 m off solid 'mesh'"),
+        (Support("far", point=(1.0, 0.0, 0.0)), "is 90 cm off solid 'mesh'"),
     ],
 )
 def test_supports_that_hold_nothing_or_everything(support, said):

@@ -299,7 +299,7 @@ def test_a_wall_that_leaves_no_hollow_is_told(caplog):
     ball = trimesh.creation.icosphere(2, 0.1)
     cells = finite_cells(Wall.of_surface(ball, 0.11, "inside"), 8, name="a filled ball")
     assert cells.volume == pytest.approx(finite_cells(ball, 8).volume, rel=1e-6)
-    assert "'a filled ball': a wall of 0.11 m leaves no hollow" in caplog.text
+    assert "'a filled ball': a wall of 11 cm leaves no hollow" in caplog.text
     caplog.clear()
     finite_cells(Wall.of_surface(ball, 0.05, "inside"), 8, name="a hollow ball")
     assert not caplog.text
@@ -315,7 +315,7 @@ NEEDLE = trimesh.Trimesh([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2]], process
     [
         (lambda: Wall.of_surface(BALL, 0.0), "found a wall of 0 m, expected a thickness above 0"),
         (lambda: Wall.of_surface(BALL, float("nan")), "found a wall of nan m"),
-        (lambda: Wall.of_surface(BALL, 0.3), "longest side is 0.2 m, expected less"),
+        (lambda: Wall.of_surface(BALL, 0.3), "longest side is 20 cm, expected less"),
         (lambda: Wall.of_surface(BALL, 0.01, "left"), "expected one of about, inside, outside"),
         (
             lambda: Wall.of_surface(
@@ -325,7 +325,7 @@ NEEDLE = trimesh.Trimesh([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2]], process
         ),
         (
             lambda: finite_cells(Wall.of_surface(BALL, 5e-5), 12),
-            "expected at least 0.01 of the lattice spacing of 0.0167 m; raise the resolution to 41",
+            "expected at least 0.01 of the lattice spacing of 1.67 cm; raise the resolution to 41",
         ),
         (
             lambda: finite_cells(

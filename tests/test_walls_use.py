@@ -108,7 +108,7 @@ def test_modes_of_a_sheet_with_a_wall_are_those_of_the_plate(sheet, plate, tmp_p
         (["--wall", "2 mm"], "found a wall of voxels, expected finite cells"),
         (["--wall", "2 mm", "--discretisation", "voxel"], "add --discretisation finite-cell"),
         (["--wall", "9 um", *"--discretisation finite-cell".split()], "expected at least 0.01 of"),
-        (["--wall", "3", *"--discretisation finite-cell".split()], "longest side is 0.2 m"),
+        (["--wall", "3", *"--discretisation finite-cell".split()], "longest side is 20 cm"),
         (["--discretisation", "finite-cell"], "is flat, .* such as a wall with finite cells"),
     ],
 )
@@ -174,10 +174,10 @@ def test_a_project_strikes_the_skin_of_its_wall(sheet, tmp_path):
 
 
 def test_the_studio_shows_the_skin_of_a_wall(sheet):
-    news = SolidProcess().read(sheet, 1.0, WallSize(0.002), 1)
-    assert news.vertices > 8 and news.longest_side_m == pytest.approx(0.2)
+    news = SolidProcess().read(sheet, 1.0, WallSize(0.002), None, 1)
+    assert news.vertices > 8 and max(news.hints.extents) == pytest.approx(0.2)
     rows = {"regions": [{"name": "top", "material": "tin", "where": "z > 0"}], "supports": []}
-    _, faults = PlacingProcess().place(sheet, 1.0, rows, WallSize(0.002), Path(), 1)
+    _, faults = PlacingProcess().place(sheet, 1.0, rows, WallSize(0.002), None, Path(), 1)
     assert not faults
 
 

@@ -11,18 +11,25 @@ def options(values: Mapping[str, Any]) -> list[str]:
     """Options of a command from their values, in order.
 
     A list stands for several words, True for the option alone; an option without a value (None,
-    False, an empty text or list) is left out.
+    False, an empty text or list) is left out. A text that begins like an option is one word with
+    it.
 
     Examples
     --------
     >>> options({"max_leaves": 30, "at": [0.1, -2.0], "tune": True, "weak": False, "only": None})
     ['--max-leaves', '30', '--at', '0.1', '-2.0', '--tune']
+    >>> options({"up": "-y"})
+    ['--up=-y']
     """
     words = []
     for name, value in values.items():
         if value is None or value is False or value in ("", [], ()):
             continue
-        words.append(f"--{name.replace('_', '-')}")
+        option = f"--{name.replace('_', '-')}"
+        if isinstance(value, str) and value.startswith("-"):
+            words.append(f"{option}={value}")
+            continue
+        words.append(option)
         if value is not True:
             words += map(str, value) if isinstance(value, (list, tuple)) else [str(value)]
     return words

@@ -34,13 +34,12 @@ def composition_of(config: Config, model: str) -> CompositionEntry:
 
 def surface_of(config: Config, model: str) -> Surface:
     """Triangles [m] around a model; of a wall, both of its sides."""
-    mesh = mesh_of(config, model)
+    mesh, entry = mesh_of(config, model), config["models"][model]
     if describes_regions(mesh):
-        return joined_surface(read_composition(mesh), mesh)
-    entry = config["models"][model]
+        return joined_surface(read_composition(mesh), mesh, entry["up"])
     if entry["wall"] is None:
-        return load_surface(mesh, entry["unit"])
-    return WallSize(entry["wall"], entry["wall_side"]).read(mesh, entry["unit"]).skin
+        return load_surface(mesh, entry["unit"], up=entry["up"])
+    return WallSize(entry["wall"], entry["wall_side"]).read(mesh, entry["unit"], entry["up"]).skin
 
 
 def files_of(regions: str) -> list[str]:

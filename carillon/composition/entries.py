@@ -98,7 +98,9 @@ class RegionEntry:
     label: Annotated[str, Within(min_length=1, max_length=100)] | None = option(
         None, "name or number of its label in that file"
     )
-    unit: MetresPerUnit = option(1.0, "metres per unit of its mesh or labels [m]")
+    unit: MetresPerUnit = option(
+        1.0, "unit of its mesh or labels: m, cm, mm, um or in, or a number [m]"
+    )
     painted: Paint | None = option(
         None,
         "places of the surface, x, y, z, and the radius about each that is painted [m]: what is "
@@ -182,23 +184,24 @@ class RegionEntry:
         if self.labels is not None and self.label is not None:
             return _labelled(_path(self.labels, solid.folder), self.label, self.unit, solid)
         if self.mesh is not None:
-            return ClosedSurface(_closed(self.own_surface(solid.folder), self.name))
+            own = self.own_surface(solid.folder, solid.up)
+            return ClosedSurface(_closed(own, self.name))
         if self.part is not None:
-            part = _part(solid.mesh, self.part, solid.unit, self.name)
+            part = _part(solid.mesh, self.part, solid.unit, self.name, solid.up)
             return ClosedSurface(_closed(part, self.name))
         if self.painted is not None:
             return Painted(solid.surface, self.painted, self.depth)
         return Everywhere()
 
-    def own_surface(self, folder: Path) -> Surface:
-        """The closed surface in its mesh file, which is relative to a folder."""
+    def own_surface(self, folder: Path, up: str | None = None) -> Surface:
+        """The closed surface in its mesh file, relative to a folder, whose axis `up` points up."""
         from carillon.fem.geometry import load_surface  # Its import takes long.
 
         assert self.mesh is not None
         path = _path(self.mesh, folder)
         if self.part is not None:
-            return _part(path, self.part, self.unit, self.name)
-        return load_surface(path, self.unit)
+            return _part(path, self.part, self.unit, self.name, up)
+        return load_surface(path, self.unit, up=up)
 
     def axes(self) -> np.ndarray | AxesAt | None:
         """Axes of the material, or where they lie at each place."""
@@ -324,11 +327,11 @@ def _path(file: str, folder: Path) -> str:
     return file if file.startswith("builtin:") else str(folder / file)
 
 
-def _part(path: str, name: str, unit: float, region: str) -> Surface:
+def _part(path: str, name: str, unit: float, region: str, up: str | None) -> Surface:
     """All parts of that name together."""
     from carillon.fem.geometry.parts import named_surfaces
 
-    parts = named_surfaces(path, unit)
+    parts = named_surfaces(path, unit, up)
     own = [surface for each, surface in parts if each == name]
     if not own:
         known = ", ".join(sorted({each for each, _ in parts}))
@@ -339,7 +342,7 @@ def _part(path: str, name: str, unit: float, region: str) -> Surface:
 def _labelled(path: str, label: str, unit: float, solid: SolidFrame) -> Where:
     from carillon.fem.geometry.labels import read_labels
 
-    labels = read_labels(path, unit, box=np.asarray(solid.surface.bounds))
+    labels = read_labels(path, unit, box=np.asarray(solid.surface.bounds), up=solid.up)
     numbers = [number for number, name in labels.names.items() if name == label]
     if not numbers and label.isdigit() and int(label) in labels.names:
         numbers = [int(label)]
@@ -361,6 +364,8 @@ class SolidFrame:
     """Metres per unit of the mesh."""
     folder: Path = Path()
     """That files of entries are relative to."""
+    up: str | None = None
+    """Axis that points up in its mesh and in all files of entries, see `UpAxis`."""
 
 
 @dataclass(frozen=True)
@@ -431,8 +436,10 @@ def _closed(surface: Surface, region: str) -> Surface:
     return surface
 
 
-def joined_surface(entry: CompositionEntry, path: str) -> Surface:
+def joined_surface(entry: CompositionEntry, path: str, up: str | None = None) -> Surface:
     """The surface around all regions of a file, each of which is a closed surface.
+
+    The axis `up` of their meshes points up.
 
     Raises UserError if one is not, or there are none.
     """
@@ -444,7 +451,7 @@ def joined_surface(entry: CompositionEntry, path: str) -> Surface:
                 f"{path}: region {each.name!r} has no mesh; a solid made of its regions needs one "
                 "of each, or name the solid's own mesh and --regions"
             )
-        surfaces.append(each.own_surface(folder))
+        surfaces.append(each.own_surface(folder, up))
     if not surfaces:
         raise UserError(f"{path}: has no regions; expected some with a mesh each")
     return _joined(surfaces)

@@ -12,6 +12,7 @@ from carillon.composition.places import ClosedSurface, Where
 from carillon.errors import UserError
 from carillon.fem.embedding import embedding
 from carillon.fem.finite_cells.model import FiniteCellModel
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.model import Solid
 from carillon.fem.supports import Supports
 
@@ -189,8 +190,8 @@ def _in_solid(part: Support, point: Array, solid: Solid, surface: Surface, name:
     if distance > REACH * solid.mesh.edge:
         shown, other = (", ".join(f"{value:.4g}" for value in each) for each in (point, place))
         raise UserError(
-            f"{part.label}: the point ({shown}) m is {distance:.3g} m off solid {name!r}; expected "
-            f"one of it, the nearest is ({other}) m"
+            f"{part.label}: the point ({shown}) m is {length_in_words(distance)} off solid "
+            f"{name!r}; expected one of it, the nearest is ({other}) m"
         )
     return np.asarray(place)
 

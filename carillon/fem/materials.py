@@ -45,14 +45,20 @@ def smooth_field(mesh: HexMesh, seed: int = 0) -> Array:
 
 
 def young_modulus(
-    name: str, mesh: HexMesh, seed: int = 0, label: str = "mesh", unit: float = 1.0
+    name: str,
+    mesh: HexMesh,
+    seed: int = 0,
+    label: str = "mesh",
+    unit: float = 1.0,
+    up: str | None = None,
 ) -> Array:
     """Moduli (m,) [Pa] of a material: one of `NAMES`, or a file.
 
     A file holds one value per cell, or is a mesh of volume elements or an image (.vti) with Young's
     moduli: then each cell has that of the element in which its middle lies, or which is nearest.
     Raises UserError if there is no such file, for what `carillon.fem.moduli` refuses, or if a mesh
-    or an image is elsewhere than the cells. `unit`: metres per unit of its coordinates.
+    or an image is elsewhere than the cells. `unit`: metres per unit of its coordinates, whose axis
+    `up` is turned to z.
 
     Examples
     --------
@@ -81,7 +87,7 @@ def young_modulus(
     path = require_file(name, "a material, a file of moduli")
     if not _is_cell_file(name):
         return read_moduli(path, count, label)
-    return _of_cells(name, mesh, unit)
+    return _of_cells(name, mesh, unit, up)
 
 
 def _is_cell_file(name: str) -> bool:
@@ -90,10 +96,10 @@ def _is_cell_file(name: str) -> bool:
     return is_cell_file(name)
 
 
-def _of_cells(name: str, mesh: HexMesh, unit: float) -> Array:
+def _of_cells(name: str, mesh: HexMesh, unit: float, up: str | None) -> Array:
     from carillon.fem.geometry.labels import read_cell_moduli
 
-    moduli = read_cell_moduli(name, unit)
+    moduli = read_cell_moduli(name, unit, up=up)
     size = mesh.edge if mesh.span is None else mesh.edge * mesh.span[:, None]
     middles = mesh.origin + mesh.edge * mesh.grid + 0.5 * size
     return require_moduli(moduli.at(middles), mesh.n_cells, name, points=False)

@@ -25,8 +25,10 @@ WORKERS_OF_CORE = 4
 """Processes or threads that one command may start for each core of a machine with more."""
 
 
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 """Units of lengths in texts, in metres."""
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
+"""Axes of a mesh that may point up."""
 _LENGTH = re.compile(r"([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?) *([a-zµ]+)")
 
 
@@ -72,6 +74,34 @@ def _length(value: Any) -> Any:
     return float(found[1]) * LENGTHS[found[2]]
 
 
+def _unit(value: Any) -> Any:
+    """Metres per unit from the unit's name; what is no text as it is.
+
+    Examples
+    --------
+    >>> _unit("mm"), _unit(0.001)
+    (0.001, 0.001)
+    """
+    if not isinstance(value, str):
+        return value
+    if value.strip() not in LENGTHS:
+        raise ValueError(
+            f"found {value!r}, expected one of {', '.join(LENGTHS)}, or a number of metres per unit"
+        )
+    return LENGTHS[value.strip()]
+
+
+def unit_in_words(metres: float) -> str | float:
+    """Name of a unit of so many metres; the number if it has none.
+
+    Examples
+    --------
+    >>> unit_in_words(0.001), unit_in_words(0.3048)
+    ('mm', 0.3048)
+    """
+    return next((name for name, each in LENGTHS.items() if each == metres), metres)
+
+
 def _reachable(tolerance: float) -> float:
     if 0.0 < tolerance < LEAST_TOLERANCE:
         raise ValueError(
@@ -112,7 +142,18 @@ Discretisation = Annotated[
     "cubes that are full or empty (voxel), or cells of degree 4 and of four times their edge of "
     "which only what is inside counts (finite-cell)",
 ]
-MetresPerUnit = Annotated[float, between(*UNITS), "metres per unit of the mesh's coordinates [m]"]
+MetresPerUnit = Annotated[
+    float,
+    between(*UNITS),
+    Check(_unit, before=True, besides=True),
+    "unit of the mesh's coordinates: m, cm, mm, um or in, or a number of metres [m]",
+]
+UpAxis = Annotated[
+    str,
+    OneOf(*UP_AXES),
+    "axis of the mesh file that points up: the solid is turned so that it becomes z, and all "
+    "coordinates are those of the turned solid; null leaves the axes of the file",
+]
 Fill = Annotated[str, OneOf("winding", "centre", "orthographic"), "which voxels the surface fills"]
 Components = Annotated[
     str,

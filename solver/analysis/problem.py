@@ -41,6 +41,7 @@ from carillon.parameters.quantities import (
     Number,
     PoissonRatio,
     Resolution,
+    UpAxis,
     WallSide,
     WallThickness,
 )
@@ -93,6 +94,7 @@ class ProblemOptions:
     wall: WallThickness | None = option(None, metavar="LENGTH")
     wall_side: WallSide = option("about")
     unit: MetresPerUnit = option(1.0)
+    up: UpAxis | None = option(None)
     fill: Fill = option("winding")
     components: Components = option("error")
     poisson: PoissonRatio = option(DEFAULT_POISSON)
@@ -202,12 +204,12 @@ def build_problem(options: ProblemOptions, surface: SolidSurface | None = None) 
     """
     begin = time.perf_counter()
     if surface is None:
-        surface = SolidSurface.read(options.mesh, options.unit, options.wall_size)
+        surface = SolidSurface.read(options.mesh, options.unit, options.wall_size, options.up)
     mesh, covering = discretised(surface, options)
-    surface.doubt_unit()
+    surface.hints.say_size_and_filling()
     meshed = time.perf_counter()
     label = f"mesh '{surface.name}', resolution {options.resolution}"
-    young = young_modulus(options.material, mesh, options.seed, label, options.unit)
+    young = young_modulus(options.material, mesh, options.seed, label, options.unit, options.up)
     composed = _composed(options, surface)
     placed = PlacedRegions(Regions.one(options.poisson, options.density))
     if composed.composition is not None:
@@ -247,7 +249,9 @@ def _composed(options: ProblemOptions, surface: SolidSurface) -> Placed:
             f"{described} has regions with Poisson's ratios and densities of their own; leave out "
             "--poisson and --density"
         )
-    frame = SolidFrame(options.mesh, surface.triangles, surface.name, options.unit, folder)
+    frame = SolidFrame(
+        options.mesh, surface.triangles, surface.name, options.unit, folder, options.up
+    )
     return compose(entry, frame, options.fix or ())
 
 

@@ -7,7 +7,7 @@ from carillon.arrays import Surface
 from carillon.composition.entries import describes_regions, joined_surface, read_composition
 from carillon.errors import UserError
 from carillon.fem.geometry import load_surface, surface_name
-from carillon.fem.geometry.size import doubt_unit
+from carillon.fem.geometry.hints import MeshHints
 from carillon.fem.geometry.walls import Wall, WallSize
 
 
@@ -23,9 +23,13 @@ class SolidSurface:
     """Metres per unit of the mesh's own coordinates."""
     wall: Wall | None = None
     """The wall that the solid is; None if it is what the surface encloses."""
+    up: str | None = None
+    """Axis of the mesh that points up, see `carillon.parameters.quantities.UpAxis`."""
 
     @classmethod
-    def read(cls, mesh: str, unit: float = 1.0, wall: WallSize | None = None) -> Self:
+    def read(
+        cls, mesh: str, unit: float = 1.0, wall: WallSize | None = None, up: str | None = None
+    ) -> Self:
         """Read the mesh, see `carillon.fem.geometry.load_surface` also for the errors.
 
         Of a file of regions with a mesh each it is that of all together, which takes no wall.
@@ -36,11 +40,11 @@ class SolidSurface:
                     f"{mesh}: is made of its regions, expected one mesh that a wall follows; name "
                     "it, with --regions"
                 )
-            return cls(mesh, joined_surface(read_composition(mesh), mesh), unit)
+            return cls(mesh, joined_surface(read_composition(mesh), mesh, up), unit, up=up)
         if wall is not None:
-            made = wall.read(mesh, unit)
-            return cls(mesh, made.skin, unit, made)
-        return cls(mesh, load_surface(mesh, unit), unit)
+            made = wall.read(mesh, unit, up)
+            return cls(mesh, made.skin, unit, made, up)
+        return cls(mesh, load_surface(mesh, unit, up=up), unit, up=up)
 
     @property
     def name(self) -> str:
@@ -57,6 +61,8 @@ class SolidSurface:
         """Sides (3,) of the bounding box [m]."""
         return tuple(float(side) for side in self.solid.extents)
 
-    def doubt_unit(self) -> None:
-        """Log a hint, once, if the size suggests that the unit is mistaken."""
-        doubt_unit(self.mesh, self.extents, self.unit)
+    @property
+    def hints(self) -> MeshHints:
+        """What may be otherwise than the mesh was opened."""
+        is_wall = self.wall is not None
+        return MeshHints.of(self.mesh, self.triangles, self.unit, self.up, is_wall)

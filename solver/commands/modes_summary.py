@@ -22,6 +22,8 @@ from solver.refinement.errors import (
 
 REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
 """Words for what is counted as refined."""
+LOWEST_HEARD = 20.0
+"""Lowest frequency that is heard [Hz]."""
 EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
 """Words for the expected errors."""
 
@@ -63,6 +65,8 @@ def attributes_of(
     }
     if solid.wall is not None:
         attributes |= {"wall": solid.wall, "wall_side": solid.wall_side}
+    if solid.up is not None:
+        attributes["up"] = solid.up
     if solver.tolerance is not None:
         attributes["tolerance"] = solver.tolerance
     return attributes
@@ -98,6 +102,8 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
         f"{attributes['residual_max']:.1e}, orthogonal to {attributes['orthogonality']:.1e}, "
         f"{total:.1f} s on {attributes['ranks']} rank{'s' if attributes['ranks'] > 1 else ''}"
     )
+    if len(elastic) and elastic[-1] < LOWEST_HEARD:
+        print(f"all modes are below hearing ({LOWEST_HEARD:g} Hz); see the size and its unit")
     if attributes["method"] == "hcms" and "corrections" not in attributes:
         print(UNCORRECTED)
     if attributes.get("inertia_count", -1) == attributes.get("inertia_expected"):

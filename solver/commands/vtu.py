@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--unit",
         type=reader(MetresPerUnit),
         default=1.0,
-        help="metres per unit of that mesh (default: 1)",
+        help="unit of that mesh: m, cm, mm, um or in, or a number of metres (default: 1)",
     )
     add_options(parser, MotionOptions)
 
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
     spectrum = StreamedModes.of_file(arguments.file)
     shown = None
     if arguments.surface:
-        surface = SolidSurface.read(arguments.surface, arguments.unit, spectrum.wall)
+        surface = SolidSurface.read(arguments.surface, arguments.unit, spectrum.wall, spectrum.up)
         shown = displayed_surface(spectrum.model, surface.triangles, arguments.surface)
     hertz = spectrum.frequencies
     if motion.mode is None:

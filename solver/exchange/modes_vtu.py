@@ -52,7 +52,8 @@ class StreamedModes:
     shapes: Callable[[int, int], Iterator[Array]]
     """Displacements (n, 3) of the modes from one to before another, counted from 0."""
     wall: WallSize | None = None
-    """The wall that the solid is, see `solver.files.modes_file.ModesFile`."""
+    up: str | None = None
+    """The wall that the solid is, and the axis of its mesh that became z; see `ModesFile`."""
 
     @classmethod
     def of_file(cls, path: str | Path) -> "StreamedModes":
@@ -68,7 +69,7 @@ class StreamedModes:
                     for column in block.T:
                         yield column.reshape(-1, 3)
 
-        return cls(file.model, file.frequencies, file.residuals, shapes, file.wall)
+        return cls(file.model, file.frequencies, file.residuals, shapes, file.wall, file.up)
 
     @classmethod
     def of_contents(cls, file: ModesFile) -> "StreamedModes":
@@ -79,7 +80,7 @@ class StreamedModes:
         def shapes(first: int, stop: int) -> Iterator[Array]:
             return (column.reshape(-1, 3) for column in modes[:, first:stop].T)
 
-        return cls(file.model, file.frequencies, file.residuals, shapes, file.wall)
+        return cls(file.model, file.frequencies, file.residuals, shapes, file.wall, file.up)
 
     def grid(self, shown: Displayed, points: Array | None = None) -> UnstructuredGrid:
         """The cells with their data, at other `points` (p, 3) [m] than theirs if given."""

@@ -16,6 +16,7 @@ from carillon.fem.geometry.walls import SIDES, WallSize
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.files.datasets import find, finite, put, read, refused
 from carillon.files.hdf5 import create_h5, open_h5
+from carillon.parameters.quantities import UP_AXES
 from carillon.records import provenance
 from carillon.records.measurement import measured
 from solver.files.model_group import get_model, put_model
@@ -63,6 +64,12 @@ class ModesFile:
         """The wall that the solid is, as its file says; None if its mesh encloses it."""
         thickness, side = (self.attributes.get(name) for name in ("wall", "wall_side"))
         return WallSize(float(thickness), str(side)) if thickness and side in SIDES else None
+
+    @property
+    def up(self) -> str | None:
+        """Axis of its mesh that was turned to z; None if its axes are those of the mesh."""
+        axis = self.attributes.get("up")
+        return str(axis) if axis in UP_AXES else None
 
 
 def write_modes(

@@ -13,6 +13,7 @@ from carillon.fem.finite_cells.cells import surface_points
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.faces import boundary_faces, surface_quads
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.model import Solid
 
 logger = logging.getLogger(__name__)
@@ -55,9 +56,9 @@ class Surface:
         if distance > reach:
             kind = "solid" if self.nodes is None else "voxels"
             raise UserError(
-                f"{what}: the point ({_shown(point)}) m is {distance:.3g} m from the surface of "
-                f"the {kind}, expected at most {reach:.3g} m; the nearest one is "
-                f"({_shown(self.points[index])}) m"
+                f"{what}: the point ({_shown(point)}) m is {length_in_words(distance)} from the "
+                f"surface of the {kind}, expected at most {length_in_words(reach)}; the nearest "
+                f"one is ({_shown(self.points[index])}) m"
             )
         return int(index)
 
@@ -80,8 +81,8 @@ class Surface:
         distance = float(np.linalg.norm(point - place))
         if distance > self.edge * (OUTSIDE if self.nodes is None else 1.0):
             logger.warning(
-                f"{what}: the point ({_shown(point)}) m is {distance:.3g} m off the surface; "
-                f"({_shown(place)}) m is taken instead"
+                f"{what}: the point ({_shown(point)}) m is {length_in_words(distance)} off the "
+                f"surface; ({_shown(place)}) m is taken instead"
             )
         return place, -outward
 

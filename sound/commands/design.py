@@ -15,6 +15,7 @@ import numpy as np
 
 from carillon.command_line.progress import LINE_SECONDS, say
 from carillon.errors import UserError
+from carillon.fem.geometry.size import lengths_in_words
 from carillon.files.locks import locked
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
@@ -102,6 +103,7 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     elif out.exists() and not options.restart:
         initial = read_design(out)
     problem = prepare(project)
+    say(f"{project.solid.mesh}: {lengths_in_words(np.ptp(problem.vertices, axis=0))}")
     if initial is not None:
         require_same_voxels(problem, initial)
         so_far = initial.history["evaluations"][-1:].sum()
@@ -173,6 +175,7 @@ def summarise(design: Design) -> dict[str, Any]:
         **{key: evidence[key] for key in _COSTS},
         "fall": fall(evidence["cost_start"], evidence["cost"]),
         **{key: evidence[key] for key in _EFFORT},
+        "extents_m": np.ptp(design.surface_vertices, axis=0).tolist(),
         "modes": len(design.frequencies),
         "partials": len(which),
         "targets": [strike.name for strike in design.strikes],
@@ -233,7 +236,7 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             *_material_sentences(design, summary),
             _damping_sentence(summary),
             *([summary["verdict"]["sentence"]] if summary["verdict"] else []),
-            f"design: {out}",
+            f"design: {out}; solid {lengths_in_words(summary['extents_m'])}",
         ]
     )
 

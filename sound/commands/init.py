@@ -3,13 +3,15 @@
 import argparse
 import os
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from carillon.arrays import Surface
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
+from carillon.parameters.quantities import MetresPerUnit, UpAxis, WallThickness
 
 ENDINGS = (".yaml", ".yml")
 """Endings of the names of project files."""
@@ -21,7 +23,7 @@ DIGITS = 5
 
 EXAMPLES = """examples:
   init pan.yaml --mesh builtin:frying-pan --clips plate.wav handle.wav
-  init jugs --mesh jug.obj
+  init jugs --mesh jug.obj --unit mm --up y
 """
 
 
@@ -39,6 +41,12 @@ class InitOptions:
         None, "a strike each, at points spread over the surface", metavar="CLIP.wav"
     )
     allow_clipped: bool = option(False, "leave out samples of clips at full scale")
+    unit: MetresPerUnit = option(1.0)
+    up: UpAxis | None = option(
+        None,
+        "axis of the mesh file that points up, and becomes z (default: y of glTF files, else z)",
+    )
+    wall: WallThickness | None = option(None, metavar="LENGTH")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,12 +64,14 @@ def run(arguments: argparse.Namespace) -> int:
 
     options = collect(InitOptions, arguments)
     path = require_output(_file_of(options.path or "."), ENDINGS)
-    values = _values(options, path.parent)
+    values = _solid(options, path.parent)
+    surface = _surface(options.mesh, values)
+    values["targets"] = _targets(options, surface, path.parent)
     text = project_text(values)
     project_of(parse_yaml(text), path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    print(_sentence(options, path))
+    print(_sentence(options, path, surface))
     return 0
 
 
@@ -72,37 +82,65 @@ def _file_of(path: str) -> str:
     return file
 
 
-def _values(options: InitOptions, folder: Path) -> dict[str, Any]:
+def _solid(options: InitOptions, folder: Path) -> dict[str, Any]:
+    """Keys of the project that say what the solid is."""
     from carillon.builtin_names import BUILTIN_PREFIX
+    from carillon.fem.geometry.turning import up_of_format
+    from carillon.parameters.quantities import unit_in_words
 
     builtin = options.mesh.startswith(BUILTIN_PREFIX)
-    mesh = options.mesh if builtin else _seen_from(folder, options.mesh)
+    values: dict[str, Any] = {"mesh": options.mesh if builtin else _seen_from(folder, options.mesh)}
+    if options.unit != 1.0:
+        values["unit"] = unit_in_words(options.unit)
+    up = options.up or up_of_format(options.mesh)
+    if up is not None:
+        values["up"] = up
+    if options.wall is not None:
+        values |= {"wall": options.wall, "discretisation": "finite-cell"}
+    return values
+
+
+def _surface(mesh: str, values: Mapping[str, Any]) -> Surface:
+    """The surface that is struck, of which hints are logged."""
+    from carillon.fem.geometry.hints import MeshHints
+    from carillon.fem.geometry.walls import WallSize
+    from carillon.parameters.model import checked
+    from sound.strikes import struck_surface
+
+    unit = checked("unit", values.get("unit", 1.0), MetresPerUnit)
+    wall = WallSize(values["wall"]) if "wall" in values else None
+    up = values.get("up")
+    surface = struck_surface(mesh, unit, wall=wall, up=up)
+    MeshHints.of(mesh, surface, unit, up, is_wall=wall is not None).say()
+    return surface
+
+
+def _targets(options: InitOptions, surface: Surface, folder: Path) -> list[dict[str, Any]]:
     if options.clips is None:
-        return {"mesh": mesh, "targets": _targets(options.mesh, [PLACEHOLDER])}
+        return _at_points(surface, [PLACEHOLDER], options.unit)
     clips = [_seen_from(folder, clip) for clip in options.clips]
-    targets = _targets(options.mesh, clips)
+    targets = _at_points(surface, clips, options.unit)
     if options.allow_clipped:
         targets = [target | {"allow_clipped": True} for target in targets]
     _require_modes(options.clips, options.allow_clipped)
-    return {"mesh": mesh, "targets": targets}
+    return targets
 
 
-def _targets(mesh: str, clips: Sequence[str]) -> list[dict[str, Any]]:
+def _at_points(surface: Surface, clips: Sequence[str], unit: float) -> list[dict[str, Any]]:
     import numpy as np
 
     from solver.response.vertices import spread
     from sound.clips.files import clip_names
-    from sound.strikes import longest_side, struck_surface
+    from sound.strikes import longest_side
 
-    surface = struck_surface(mesh)
     vertices = np.asarray(surface.vertices)[np.unique(surface.faces)]
     chosen = spread(vertices, surface.bounds.mean(axis=0)[None], len(clips))
     if len(chosen) < len(clips):
         raise UserError(
             f"{len(clips):,} clips for {len(chosen):,} points of the surface; give fewer"
         )
-    decimals = DIGITS - int(np.ceil(np.log10(longest_side(surface))))
-    positions = np.round(vertices[chosen], decimals) + 0.0  # no -0.0
+    decimals = DIGITS - int(np.ceil(np.log10(longest_side(surface) / unit)))
+    positions = np.round(vertices[chosen] / unit, decimals) + 0.0  # no -0.0
     return [
         {"name": name, "at": position, "clip": clip}
         for name, position, clip in zip(clip_names(clips), positions.tolist(), clips)
@@ -125,9 +163,11 @@ def _seen_from(folder: Path, path: str) -> str:
     return os.path.relpath(own.parent.resolve() / own.name, folder.resolve())
 
 
-def _sentence(options: InitOptions, path: Path) -> str:
+def _sentence(options: InitOptions, path: Path, surface: Surface) -> str:
+    from carillon.fem.geometry.size import lengths_in_words
+
     run = shlex.join(["carillon", "design", str(path), "--out", str(path.with_suffix(".h5"))])
+    solid = f"{path}: a project of {options.mesh}, {lengths_in_words(surface.extents)}"
     if options.clips is not None:
-        return f"{path}: a project of {options.mesh}; next: {run}"
-    clip = path.parent / PLACEHOLDER
-    return f"{path}: a project of {options.mesh}; record a strike as {clip}, then: {run}"
+        return f"{solid}; next: {run}"
+    return f"{solid}; record a strike as {path.parent / PLACEHOLDER}, then: {run}"

@@ -119,11 +119,11 @@ def prepared_solid(
     that are not for all Poisson's ratios that are free.
     """
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
-    loaded = SolidSurface.read(solid.mesh, solid.unit, solid.wall_size)
+    loaded = SolidSurface.read(solid.mesh, solid.unit, solid.wall_size, solid.up)
     mesh, cells = discretised(loaded, solid)
-    loaded.doubt_unit()
+    loaded.hints.say_size_and_filling()
     finite = None if cells is None else cells.cells
-    frame = SolidFrame(solid.mesh, loaded.triangles, loaded.name, solid.unit)
+    frame = SolidFrame(solid.mesh, loaded.triangles, loaded.name, solid.unit, up=solid.up)
     composed = compose(composition or CompositionEntry(), frame)
     table, placed = Regions.one(solid.poisson, solid.density), None
     young: float | Array = material.young

@@ -22,6 +22,7 @@ from carillon.parameters.quantities import (
     MetresPerUnit,
     PoissonRatio,
     Resolution,
+    UpAxis,
     WallSide,
     WallThickness,
     between,
@@ -52,6 +53,7 @@ class Project:
     mesh: File = option(REQUIRED, "either builtin:NAME or a mesh file, relative to the project")
     resolution: Resolution = option(32)
     unit: MetresPerUnit = option(1.0)
+    up: UpAxis | None = option(None)
     fill: Fill = option("winding")
     components: Components = option("error")
     poisson: PoissonRatio = option(DEFAULT_POISSON)
@@ -140,7 +142,8 @@ class Project:
 
     def surface(self) -> Surface:
         """Surface that is struck, in metres; raises UserError if there is no such mesh."""
-        return struck_surface(self.solid.mesh, self.solid.unit, wall=self.solid.wall_size)
+        solid = self.solid
+        return struck_surface(solid.mesh, solid.unit, wall=solid.wall_size, up=solid.up)
 
     def strikes(self, surface: Surface) -> list[Strike]:
         """The targets' points on `surface`, which `Project.surface` made.

@@ -41,8 +41,8 @@ class TargetEntry:
     clip: File = option(REQUIRED, "file of the sound (WAV), relative to the project")
     at: Point | None = option(
         None,
-        "position on the surface in the mesh's own coordinates, as viewers of meshes show them; "
-        "the vertex nearest to it is struck [mesh unit]",
+        "position on the surface in the mesh's own coordinates, as viewers of meshes show them, or "
+        "as up turns them; the vertex nearest to it is struck [mesh unit]",
     )
     vertex: Annotated[int, between(0, 10**9)] | None = option(
         None, "number of the surface's vertex, from 0"

@@ -58,7 +58,7 @@ def _items(keys: Mapping[str, Any], entries: list[dict[str, Any]]) -> Iterator[s
 
 def _meaning(part: Mapping[str, Any]) -> str:
     meaning: str = part["description"]
-    choices = part.get("enum", [])
+    choices = [choice for choice in part.get("enum", []) if choice is not None]
     named = all(choice in meaning for choice in choices)
     return meaning if named else f"{meaning} ({', '.join(choices)})"
 

@@ -1,6 +1,6 @@
 """The solid of a scene's object: of a design, a modes file, a mesh or a ball."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -73,7 +73,7 @@ class ObjectSolid:
     """Finds the modes, which may take long; None if the object is silent. Raises ConvergenceError
     if they were not found."""
     mesh: str = ""
-    """str: name of the mesh file that the solid was made from, empty if there is none."""
+    """str: name of the mesh file whose axes the solid has, empty if there is none."""
     radius: float | None = None
     """float [m] or None: radius of a ball, None for any other solid."""
     is_held: bool = False
@@ -125,7 +125,7 @@ def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
         touched.which,
         _volume(design.model),
         lambda: Sounding(sounding, Listening.of_design(design, sounding)),
-        design.settings.get("mesh", ""),
+        _file_axes(design.settings),
         is_held=design.model.rigid_modes < RIGID_MODES,
     )
 
@@ -154,7 +154,7 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
         touched.which,
         _volume(file.model),
         lambda: Sounding(sounding, accuracy=accuracy or None),
-        file.attributes.get("mesh", ""),
+        _file_axes(file.attributes),
         is_held=file.model.rigid_modes < RIGID_MODES,
     )
 
@@ -175,6 +175,11 @@ def _heard(entry: ObjectEntry, file: ModesFile) -> SoundingSolid:
 
 def _volume(model: Solid) -> float:
     return float(model.mass / model.density)
+
+
+def _file_axes(described: Mapping[str, Any]) -> str:
+    """Name of the mesh file whose axes a design or a modes file has; empty if they were turned."""
+    return "" if described.get("up") else described.get("mesh", "")
 
 
 def _of_kind(path: str, expected: str) -> str:

@@ -145,12 +145,18 @@ def _write(options: SceneOptions, wav: WavOptions, performance: Performance) -> 
 def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
     from math import log10
 
+    import numpy as np
+
     impacts = performance.impacts
     return {
         "files": {name: getattr(options, name) for name in OUTPUTS},
         "seconds": len(performance.sound) / performance.rate,
         "rate_hz": performance.rate,
         "objects": len(performance.voices),
+        "extents_m": {
+            each.name: np.ptp(each.vertices, axis=0).tolist()
+            for each in performance.picture.objects
+        },
         "modes": sum(len(each.frequencies) for each in performance.voices if each is not None),
         "impacts": len(impacts),
         "first_impact_seconds": impacts[0].seconds if impacts else None,
@@ -204,10 +210,17 @@ def _listed(names: list[str]) -> str:
     return f"{', '.join(names[:NAMED])}{rest}"
 
 
+def _sizes(extents: dict[str, list[float]]) -> str:
+    from carillon.fem.geometry.size import lengths_in_words
+
+    return ", ".join(f"{name} {lengths_in_words(sides)}" for name, sides in extents.items())
+
+
 def _sentence(summary: dict[str, Any], level: SoundLevel | None) -> str:
     files = [name for name in summary["files"].values() if name is not None]
     return (
         f"{', '.join(files)}: {summary['seconds']:.4g} s, {summary['objects']} objects with "
         f"{summary['modes']} modes, {summary['impacts']:,} impacts; full scale is "
-        f"{summary['full_scale_pascal']:.3g} Pa{'' if level is None else f'; {level.in_words()}'}"
+        f"{summary['full_scale_pascal']:.3g} Pa{'' if level is None else f'; {level.in_words()}'}\n"
+        f"sizes: {_sizes(summary['extents_m'])}"
     )

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError, one_line
 from carillon.parameters import option, parameters
 from carillon.parameters.command_line import add_options, collect
-from carillon.parameters.quantities import between
+from carillon.parameters.quantities import MetresPerUnit, UpAxis, WallThickness, between
 
 if TYPE_CHECKING:
     import socket
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 EXAMPLES = """examples:
   carillon studio
   carillon studio builtin:bell
+  carillon studio jug.stl --unit mm --up y
   carillon studio pan.yaml --port 8620 --no-browser
   carillon studio --export page.html design.h5
 """
@@ -54,6 +55,16 @@ class StudioOptions:
         "folder of projects, made if it is not there (default: that of FILE, else "
         f"{WORKSPACE}); no other is read or written",
         metavar="FOLDER",
+    )
+    unit: MetresPerUnit | None = option(
+        None, "unit of a mesh that is opened: m, cm, mm, um or in, or metres (default: m)"
+    )
+    up: UpAxis | None = option(
+        None,
+        "axis of a mesh that is opened that points up, and becomes z (default: y of glTF, else z)",
+    )
+    wall: WallThickness | None = option(
+        None, "thickness of a wall that follows a mesh that is opened (0.8mm)", metavar="LENGTH"
     )
     port: Annotated[int, between(1, 65535)] | None = option(
         None,
@@ -91,12 +102,21 @@ def run(arguments: argparse.Namespace) -> int:
         from studio.session import open_studio
 
         workspace = _workspace(options)
-        studio = open_studio(options.what, workspace)
+        studio = open_studio(options.what, workspace, _mesh_settings(options))
         keys = Keys()
         with _launching(options, listener, keys, workspace) as tell:
             serve(studio, listener, options.host, keys, ready=tell)
     say("the studio has ended")
     return 0
+
+
+def _mesh_settings(options: StudioOptions) -> dict[str, Any]:
+    """Settings of the mesh that is opened; those that are not given are left out."""
+    given = {"unit": options.unit, "up": options.up, "wall": options.wall}
+    settings: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    if options.wall is not None:
+        settings["discretisation"] = "finite-cell"
+    return settings
 
 
 @contextmanager

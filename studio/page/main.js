@@ -17,6 +17,7 @@ import { makeMaterials } from "./panels/materials.js";
 import { makeProject } from "./panels/project.js";
 import { makeRegions } from "./panels/regions.js";
 import { makeSettings } from "./panels/settings.js";
+import { makeSize } from "./panels/size.js";
 import { makeShortcuts } from "./panels/shortcuts.js";
 import { makeSpectrum } from "./panels/spectrum.js";
 import { makeSupports } from "./panels/supports.js";
@@ -50,6 +51,7 @@ import { Selection, ServerState } from "./state.js";
 
 /** What is made in the body of `#panel-NAME`. */
 const PANELS = {
+  size: makeSize,
   regions: makeRegions,
   supports: makeSupports,
   targets: makeTargets,

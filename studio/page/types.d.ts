@@ -110,6 +110,13 @@ export interface SolidState {
   voxels: number;
   unknowns: number;
   longest_side_m: number;
+  extents_m: [number, number, number] | null;
+  /** Other units that the mesh may be in, the likeliest first. */
+  units: { name: string; metres: number; longest_m: number }[];
+  /** Axis of the mesh that seems to point up; null if z does. */
+  up: string | null;
+  /** Thickness that a shell of the mesh might have, if that is open and filled. */
+  shell_m: number | null;
 }
 
 export interface Wanted {

@@ -32,7 +32,7 @@ class PlacingProcess:
     """What the process for places of regions and supports does, on the surface read last."""
 
     def __init__(self) -> None:
-        self._read: tuple[str, float, WallSize | None] | None = None
+        self._read: tuple[str, float, WallSize | None, str | None] | None = None
         self._surface: Surface
         self._inward: Array
 
@@ -42,15 +42,16 @@ class PlacingProcess:
         unit: float,
         rows: Mapping[str, Sequence[Row]],
         wall: WallSize | None,
+        up: str | None,
         folder: Path,
         number: int,
     ) -> tuple[bytes, Faults]:
         """See `composition`."""
-        if self._read != (mesh, unit, wall):
-            surface = struck_surface(mesh, unit, wall=wall)
+        if self._read != (mesh, unit, wall, up):
+            surface = struck_surface(mesh, unit, wall=wall, up=up)
             self._inward = inward_normals(surface, np.asarray(surface.vertices, dtype=float))
-            self._surface, self._read = surface, (mesh, unit, wall)
-        frame = SolidFrame(mesh, self._surface, surface_name(mesh), unit, folder)
+            self._surface, self._read = surface, (mesh, unit, wall, up)
+        frame = SolidFrame(mesh, self._surface, surface_name(mesh), unit, folder, up)
         return composition(frame, self._inward, rows, number)
 
 

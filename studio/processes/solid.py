@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from carillon.arrays import Array
 from carillon.composition.entries import CompositionEntry
+from carillon.fem.geometry.hints import MeshHints
 from carillon.fem.geometry.walls import WallSize
 from carillon.fem.model import Solid
 from carillon.processes.threads import one_thread
@@ -40,7 +41,7 @@ from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
-from sound.strikes import Place, Strike, locate_all, longest_side, struck_surface
+from sound.strikes import Place, Strike, locate_all, struck_surface
 from studio.binary import pack
 from studio.processes.bank import Aim, Heard, bank
 from studio.processes.search import history_of
@@ -57,7 +58,7 @@ class SurfaceNews:
     message: bytes
     vertices: int
     triangles: int
-    longest_side_m: float
+    hints: MeshHints
 
 
 class SolidProcess:
@@ -72,9 +73,11 @@ class SolidProcess:
         self._own: _Sounding | None = None
         self._fine: _Sounding | None = None
 
-    def read(self, mesh: str, unit: float, wall: WallSize | None, number: int) -> SurfaceNews:
+    def read(
+        self, mesh: str, unit: float, wall: WallSize | None, up: str | None, number: int
+    ) -> SurfaceNews:
         """The surface of a mesh, or both sides of its wall, whose message has a `number`."""
-        surface = struck_surface(mesh, unit, wall=wall)
+        surface = struck_surface(mesh, unit, wall=wall, up=up)
         positions = np.asarray(surface.vertices, dtype=float)
         self._surface, self._inward = surface, inward_normals(surface, positions)
         faces = np.asarray(surface.faces)
@@ -86,7 +89,8 @@ class SolidProcess:
                 "triangles": ("u4", faces),
             },
         )
-        return SurfaceNews(message, len(positions), len(faces), longest_side(surface))
+        hints = MeshHints.of(mesh, surface, unit, up, is_wall=wall is not None)
+        return SurfaceNews(message, len(positions), len(faces), hints)
 
     def prepare(
         self, solid: ProblemOptions, material: MaterialSettings, composition: CompositionEntry

@@ -9,10 +9,14 @@ from typing import Any
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.errors import UserError
+from carillon.parameters import checked
+from carillon.parameters.quantities import MetresPerUnit, WallThickness
 from sound.project.project import Project, project_of
 from studio.rows import complete, rows_of
 
 NO_CLIP = "none"
+_LENGTHS = {"unit": MetresPerUnit, "wall": WallThickness}
+"""Settings that files may have as texts, such as mm, and pages as numbers alone."""
 _ANYWHERE = {"name": "anywhere", "vertex": 0, "clip": NO_CLIP}
 """Stands for targets where a solid has none yet."""
 LONGEST = 200
@@ -109,7 +113,9 @@ class Document:
 
 def document_of(described: Mapping[str, Any]) -> Document:
     """The document that the keys and values of a project's file describe."""
-    settings = {key: value for key, value in described.items() if key != "targets"}
+    settings = with_plain_lengths(
+        {key: value for key, value in described.items() if key != "targets"}
+    )
     targets = []
     for entry in described["targets"]:
         known = {key: entry[key] for key in Target.__dataclass_fields__ if key in entry}
@@ -118,6 +124,22 @@ def document_of(described: Mapping[str, Any]) -> Document:
         known["without"] = tuple(known.get("without", ()))
         targets.append(Target(**known))
     return Document(settings, tuple(targets))
+
+
+def with_plain_lengths(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose lengths are numbers [m], also those that a file has as texts.
+
+    Examples
+    --------
+    >>> with_plain_lengths({"unit": "mm", "wall": "2 cm"})
+    {'unit': 0.001, 'wall': 0.02}
+    """
+    return {
+        key: checked(key, value, _LENGTHS[key])
+        if key in _LENGTHS and isinstance(value, str)
+        else value
+        for key, value in settings.items()
+    }
 
 
 def merged(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,8 +15,9 @@ from sound.project.project import Project
 from studio.interface import NotFoundError
 from studio.rows import KINDS
 from studio.session.composing import add_row, change_row, move_row, paint, remove_row
-from studio.session.document import Document, Target, merged
+from studio.session.document import Document, Target, merged, with_plain_lengths
 from studio.session.examples import EXAMPLES
+from studio.session.mesh_axes import mesh_document, moved_with_mesh
 from studio.session.projects import fit_name, opened, save
 from studio.session.state import StudioState
 
@@ -40,10 +41,9 @@ def open_mesh(state: StudioState, mesh: Text, unit: float = 1.0) -> None:
     file = mesh if mesh.startswith(BUILTIN_PREFIX) else state.meshes.get(mesh)
     if file is None:
         raise NotFoundError(f"there is no mesh {mesh!r}; add it again")
-    settings: dict[str, Any] = {"mesh": file}
-    if unit != 1.0:
-        settings["unit"] = unit
-    state.open(fit_name(surface_name(file)), Document(settings))
+    state.open(
+        fit_name(surface_name(file)), mesh_document(file, {} if unit == 1.0 else {"unit": unit})
+    )
 
 
 def open_project(state: StudioState, project: Text) -> None:
@@ -113,8 +113,9 @@ def change_settings(state: StudioState, settings: dict[str, Any]) -> None:
     require_values(settings, Project, leave_out=("mesh", "targets", *KINDS))
     if settings.get("forest") is not None:
         state.workspace.path(settings["forest"])
-    document = state.document
-    changed = replace(document, settings=merged(document.settings, settings))
+    document, settings = state.document, with_plain_lengths(settings)
+    moved = moved_with_mesh(document, state.solid.strikes, settings)
+    changed = replace(moved, settings=merged(moved.settings, settings))
     state.do("change settings", changed)
 
 

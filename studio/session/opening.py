@@ -15,6 +15,8 @@ from carillon.parameters.documents import parameters_from
 from sound.project.design_file import read_design
 from sound.project.project import Project
 from studio.session.document import Document, document_of, files_of
+from studio.session.handlers import change_settings
+from studio.session.mesh_axes import mesh_document
 from studio.session.projects import fit_name, opened, with_design
 from studio.session.restoring import NONSENSE
 from studio.session.snapshot import restore
@@ -25,24 +27,40 @@ DESIGN_ENDINGS = (".h5", ".hdf5")
 UNTITLED = "untitled"
 
 
-def open_studio(what: str | None, folder: Path) -> DesignStudio:
+def open_studio(
+    what: str | None, folder: Path, settings: Mapping[str, Any] | None = None
+) -> DesignStudio:
     """A studio in a folder, which goes on with what it was left with there, if that is asked for.
 
     It begins with a project, a mesh or a design in the folder, or `builtin:NAME`; with None, with
-    what it was left with.  Raises UserError if that cannot be opened, another studio works in the
-    folder, or what it was left with names files outside of the folder.
+    what it was left with.  `settings` are those of the mesh that is opened: how large it is, what
+    points up, and its wall.  Raises UserError if that cannot be opened, another studio works in the
+    folder, what it was left with names files outside of the folder, or settings are given and no
+    mesh is opened.
     """
+    if settings and (what is None or not _is_mesh(what)):
+        raise UserError(
+            f"found {', '.join(f'--{key}' for key in settings if key != 'discretisation')} and no "
+            "mesh; a project or a design says so itself, and the page asks for it"
+        )
     workspace = Workspace(folder)
     try:
-        name, document = _begun(what, workspace)
+        name, document = _begun(what, workspace, settings or {})
         session = workspace.read_session()
         studio = DesignStudio(workspace, name, document)
         if session is not None and _goes_on(session, what, name):
             _go_on(studio, session)
+        state = studio.session
+        if settings and any(state.document.settings.get(key) != settings[key] for key in settings):
+            change_settings(state, dict(settings))
         return studio
     except BaseException:
         workspace.close()
         raise
+
+
+def _is_mesh(what: str) -> bool:
+    return Path(what).suffix.lower() not in (*PROJECT_ENDINGS, *DESIGN_ENDINGS)
 
 
 def _goes_on(session: Mapping[str, Any], what: str | None, name: str) -> bool:
@@ -64,12 +82,14 @@ def _go_on(studio: DesignStudio, session: Mapping[str, Any]) -> None:
         say(f"{file}: cannot be gone on with ({one_line(str(error))}), all begins anew")
 
 
-def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
+def _begun(
+    what: str | None, workspace: Workspace, settings: Mapping[str, Any]
+) -> tuple[str, Document]:
     if what is None:
         return UNTITLED, Document({})
     if what.startswith(BUILTIN_PREFIX):
         name = surface_name(what)
-        return fit_name(name), Document({"mesh": what}).require_sound(workspace.folder)
+        return fit_name(name), mesh_document(what, settings).require_sound(workspace.folder)
     path = Path(what)
     if not _is_file(path):
         raise UserError(
@@ -86,7 +106,7 @@ def _begun(what: str | None, workspace: Workspace) -> tuple[str, Document]:
         return path.stem, opened(workspace, path.stem)
     if path.suffix.lower() in DESIGN_ENDINGS:
         return path.stem, _of_design(path, workspace)
-    return fit_name(path.stem), Document({"mesh": file}).require_sound(workspace.folder)
+    return fit_name(path.stem), mesh_document(file, settings).require_sound(workspace.folder)
 
 
 def _is_file(path: Path) -> bool:

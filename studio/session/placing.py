@@ -48,7 +48,7 @@ class Placing:
             self._placed = None
             return
         solid = document.solid(self._folder).solid
-        wanted = solid.mesh, solid.unit, rows, solid.wall_size
+        wanted = solid.mesh, solid.unit, rows, solid.wall_size, solid.up
         if wanted == self._placed:
             return
         self._numbers += 1

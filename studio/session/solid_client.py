@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from carillon.errors import UserError
+from carillon.fem.geometry.hints import MeshHints
 from carillon.fem.geometry.surface import surface_name
 from carillon.fem.geometry.walls import WallSize
 from sound.project.project import Project
@@ -34,6 +35,28 @@ class SolidNews:
     voxels: int | None = None
     unknowns: int | None = None
     longest_side_m: float | None = None
+    extents_m: tuple[float, float, float] | None = None
+    units: tuple[dict[str, Any], ...] = ()
+    """Other units that it may be in: `name`, `metres` and `longest_m`, the likeliest first."""
+    up: str | None = None
+    """Axis of the mesh that seems to point up; None if z does."""
+    shell_m: float | None = None
+    """Thickness that a shell of the mesh might have, if that is open and filled."""
+
+
+def _told(hints: MeshHints) -> dict[str, Any]:
+    longest = max(hints.extents)
+    units = (
+        {"name": name, "metres": metres, "longest_m": longest / hints.unit * metres}
+        for name, metres in hints.units.items()
+    )
+    return {
+        "longest_side_m": longest,
+        "extents_m": hints.extents,
+        "units": tuple(units),
+        "up": hints.up,
+        "shell_m": hints.shell,
+    }
 
 
 class SolidClient:
@@ -57,7 +80,7 @@ class SolidClient:
         self.strikes: dict[str, Strike] = {}
         self.wanted: dict[str, Any] | None = None
         self.project: Project | None = None
-        self._read: tuple[str, float, WallSize | None] | None = None
+        self._read: tuple[str, float, WallSize | None, str | None] | None = None
         self._prepared: Any = None
         self._aimed: Any = None
         self._placed: tuple[Target, ...] | None = None
@@ -95,7 +118,7 @@ class SolidClient:
         try:
             project = document.solid(self._folder)
             solid, material = project.solid, project.material
-            await self._bring_surface(document.mesh, solid.mesh, solid.unit, solid.wall_size)
+            await self._bring_surface(document.mesh, project)
             await self._bring_voxels(solid, material, project.composition)
         except UserError as error:
             self._tell(phase="failed", message=str(error), progress=None)
@@ -108,10 +131,10 @@ class SolidClient:
         """Call the process, see `studio.processes.solid.SolidProcess`."""
         return await self._worker.call(name, *arguments)
 
-    async def _bring_surface(
-        self, mesh: str, path: str, unit: float, wall: WallSize | None
-    ) -> None:
-        wanted = mesh, unit, wall
+    async def _bring_surface(self, mesh: str, project: Project) -> None:
+        solid = project.solid
+        how = solid.unit, solid.wall_size, solid.up
+        wanted = mesh, *how
         if self._read == wanted:
             return
         self._forget()
@@ -119,14 +142,14 @@ class SolidClient:
         self._changed()
         self._numbers += 1
         result = await self._worker.call(
-            "read", path, unit, wall, self._numbers, seconds=READ_SECONDS
+            "read", solid.mesh, *how, self._numbers, seconds=READ_SECONDS
         )
         self.surface, self._read = (self._numbers, result.message), wanted
         self._tell(
             surface=self._numbers,
             vertices=result.vertices,
             triangles=result.triangles,
-            longest_side_m=result.longest_side_m,
+            **_told(result.hints),
         )
 
     async def _bring_voxels(self, *prepared: Any) -> None:

@@ -20,7 +20,7 @@ SAVED_SECONDS = 2.0
 Told = Callable[["StudioState"], dict[str, Any]]
 """Function that describes a state: to pages, or for the file of the session."""
 _OF_VOXELS = (
-    *("mesh", "unit", "resolution", "fill", "components", "discretisation"),
+    *("mesh", "unit", "up", "resolution", "fill", "components", "discretisation"),
     *("wall", "wall_side"),
 )
 """Keys of a project whose change makes other voxels, for which no former material is one."""

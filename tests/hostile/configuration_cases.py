@@ -80,7 +80,7 @@ hostile("no launcher", "solver: {", "solver: {launcher: '', ", "launcher")
 for value in ("0", "1", "1.5", "nan", "null", "'20'", "2020-01-01", "1000000", "[20]", "-20"):
     hostile(f"resolution {value}", "resolution: 20", f"resolution: {value}", "resolution")
 for key, values in {
-    "unit": ("0", "-1", ".nan", ".inf", "1e300", "1e-300", "m"),
+    "unit": ("0", "-1", ".nan", ".inf", "1e300", "1e-300", "ell"),
     "density": ("0", "-1", ".nan", "1e300", "1e-300"),
     "seed": ("-1", "1.5", str(2**64), "nan"),
     "modes": ("11", "0", "1.5", str(2**64), "true"),

@@ -153,7 +153,8 @@ def configuration(arguments: argparse.Namespace) -> dict[str, Any]:
     """Configuration of a run with this one solid; what it leaves out takes the defaults."""
     given = vars(arguments)
     keys = (
-        *("resolution", "discretisation", "wall", "wall_side", "unit", "fill", "components"),
+        *("resolution", "discretisation", "wall", "wall_side", "unit", "up", "fill"),
+        "components",
         *("density", "modes", "seed"),
     )
     named = arguments.material in MATERIALS

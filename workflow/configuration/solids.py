@@ -20,6 +20,7 @@ from carillon.parameters.quantities import (
     NumberOfModes,
     Resolution,
     Seed,
+    UpAxis,
     WallSide,
     WallThickness,
 )
@@ -136,6 +137,7 @@ class ModelEntry(SolidEntry):
         None, "what is held: comparisons of x, y and z [m], or region:NAME; nothing if null"
     )
     unit: MetresPerUnit = option(1.0)
+    up: UpAxis | None = option(None)
     density: Density = option(1000.0)
     lumped: bool = option(
         False, "whether the mass of voxels is lumped at the nodes, as in Eq. (13) of the paper"

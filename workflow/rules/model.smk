@@ -1,6 +1,6 @@
 # From a model in the configuration to the solver's arguments.
 
-SOLID_OPTIONS = ("unit", "density", "lumped", "seed", "fill", "components")
+SOLID_OPTIONS = ("unit", "up", "density", "lumped", "seed", "fill", "components")
 HCMS_OPTIONS = ("interface", "retained_modes", "subdomains")
 CORRECTION_OPTIONS = ("corrections", "acceleration", "linear_solver", "missed_tolerance")
 

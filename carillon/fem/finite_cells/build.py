@@ -14,6 +14,7 @@ from carillon.fem.finite_cells.inside import Inside, fills, find_inside
 from carillon.fem.finite_cells.lines import CUT, FULL
 from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.grid import Grid, bounding_grid
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.geometry.voxels import COMPONENTS, checked_resolution
 from carillon.fem.geometry.walls import Wall
 
@@ -139,9 +140,9 @@ def _require_thick(wall: Wall, resolution: int, grid: Grid, name: str) -> None:
         return
     better = int(np.ceil(resolution * THINNEST * grid.edge / wall.thickness))
     raise UserError(
-        f"mesh {name!r} at resolution {resolution}: found a wall of {wall.thickness:.3g} m, "
-        f"expected at least {THINNEST:g} of the lattice spacing of {grid.edge:.3g} m; raise the "
-        f"resolution to {better}, or make it thicker"
+        f"mesh {name!r} at resolution {resolution}: found a wall of "
+        f"{length_in_words(wall.thickness)}, expected at least {THINNEST:g} of the lattice spacing "
+        f"of {length_in_words(grid.edge)}; raise the resolution to {better}, or make it thicker"
     )
 
 
@@ -182,8 +183,8 @@ def _unseen(surface: Surface | Wall, share: float, resolution: int, grid: Grid, 
     remedy = f"to {better}" if better else "or turn the solid"
     return (
         f"mesh {name!r} at resolution {resolution} is so thin that lines of the lattice, whose "
-        f"spacing is {grid.edge:.3g} m, find {share:.0%} of its volume; raise the resolution "
-        f"{remedy}"
+        f"spacing is {length_in_words(grid.edge)}, find {share:.0%} of its volume; raise the "
+        f"resolution {remedy}"
     )
 
 
@@ -198,8 +199,8 @@ def _lost(surface: Surface | Wall, inside: Inside, resolution: int, grid: Grid, 
         return nothing
     remedy = f"to {better}" if better else "or make them thicker"
     return (
-        f"{start} has parts far thinner than the lattice spacing of {grid.edge:.3g} m, which are "
-        f"lost between its lines; raise the resolution {remedy}"
+        f"{start} has parts far thinner than the lattice spacing of {length_in_words(grid.edge)}, "
+        f"which are lost between its lines; raise the resolution {remedy}"
     )
 
 

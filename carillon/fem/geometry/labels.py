@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry.label_grids import GRIDS, read_grid
-from carillon.fem.geometry.located import LocatedCells
+from carillon.fem.geometry.located import LocatedCells, TurnedCells
+from carillon.fem.geometry.turning import turned_back
 from carillon.fem.geometry.volume_files import READERS, is_volume_file, read_volume_mesh
 
 LABELS = (
@@ -111,7 +112,11 @@ def is_cell_file(path: str | Path) -> bool:
 
 
 def read_labels(
-    path: str | Path, unit: float = 1.0, array: str | None = None, box: Array | None = None
+    path: str | Path,
+    unit: float = 1.0,
+    array: str | None = None,
+    box: Array | None = None,
+    up: str | None = None,
 ) -> Labels:
     """The labels in a file: a mesh of volume elements, `.vti`, or `.npy` that fills a box.
 
@@ -125,6 +130,8 @@ def read_labels(
         `carillon.fem.geometry.label_grids.read_grid`.
     array
         Name of the array; the first of `LABELS` unless given, and of `.npy` its only one.
+    up
+        Axis of the file that points up: its cells are turned as the solid is whose `box` this is.
 
     Examples
     --------
@@ -135,7 +142,7 @@ def read_labels(
     >>> labels.at(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]])).tolist()
     [3, 5, -1]
     """
-    cells, data, names = _read(path, unit, box)
+    cells, data, names = _read(path, unit, box, up)
     values = _chosen(path, data, array, LABELS, "labels")
     whole = np.isfinite(values) & (values == np.floor(values)) if values.dtype.kind == "f" else True
     if not np.all(whole) or (len(values) and not 0 <= values.min() <= values.max() < 2**31):
@@ -149,7 +156,11 @@ def read_labels(
 
 
 def read_cell_moduli(
-    path: str | Path, unit: float = 1.0, array: str | None = None, box: Array | None = None
+    path: str | Path,
+    unit: float = 1.0,
+    array: str | None = None,
+    box: Array | None = None,
+    up: str | None = None,
 ) -> CellModuli:
     """Young's moduli [Pa] in a file, see `read_labels`; `array`: the first of `MODULI`.
 
@@ -162,14 +173,18 @@ def read_cell_moduli(
     >>> moduli.at(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]])).tolist()
     [1000000000.0, 2000000000.0]
     """
-    cells, data, _ = _read(path, unit, box)
+    cells, data, _ = _read(path, unit, box, up)
     values = _chosen(path, data, array, MODULI, "Young's moduli").astype(float)
     return CellModuli(str(path), cells, values)
 
 
 def _read(
-    path: str | Path, unit: float, box: Array | None
+    path: str | Path, unit: float, box: Array | None, up: str | None
 ) -> tuple[LocatedCells, Mapping[str, NDArray[Any]], dict[int, str]]:
+    if up is not None:
+        own = None if box is None else np.sort(turned_back(box, up), axis=0)
+        cells, data, names = _read(path, unit, own, None)
+        return TurnedCells(cells, up), data, names
     if is_volume_file(path):
         mesh = read_volume_mesh(path, unit)
         return mesh, mesh.data, mesh.names

@@ -17,6 +17,7 @@ from carillon.fem.geometry.surface import (
     parts_of_scene,
     surface_name,
 )
+from carillon.fem.geometry.turning import turned_upright
 
 if TYPE_CHECKING:
     import trimesh
@@ -26,7 +27,7 @@ MOST_PARTS = 10_000
 
 
 def named_surfaces(
-    meshes: str | Path | Sequence[str | Path], unit: float = 1.0
+    meshes: str | Path | Sequence[str | Path], unit: float = 1.0, up: str | None = None
 ) -> list[tuple[str, trimesh.Trimesh]]:
     """The parts of files and their surfaces [m], each checked as by `load_surface`, facing out.
 
@@ -34,7 +35,7 @@ def named_surfaces(
     of OBJ an object, one of 3MF an object with triangles. Where materials of a node, or groups or
     materials of an object, are closed surfaces each, they are parts. Other files are one part each,
     which has the name of the file, and so have parts without a name. Flat parts, which enclose
-    nothing, are left out.
+    nothing, are left out. `up` is turned to z, see `carillon.fem.geometry.turning`.
 
     Raises UserError for what `load_surface` refuses, of each part; if there are more than
     `MOST_PARTS`, or none.
@@ -58,7 +59,7 @@ def named_surfaces(
             found += _checked(path, parts, unit)
     if len(found) > MOST_PARTS:
         raise UserError(f"found {len(found):,} parts, expected at most {MOST_PARTS:,}; join them")
-    return found
+    return [(name, turned_upright(surface, up)) for name, surface in found]
 
 
 def _checked(path: str, parts: list[Part], unit: float) -> list[tuple[str, trimesh.Trimesh]]:

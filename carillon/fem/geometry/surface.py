@@ -22,6 +22,7 @@ from carillon.fem.geometry.orientation import turned_alike
 from carillon.fem.geometry.plain_files import obj_of_off, plain_obj, require_plain_ply, whole_stl
 from carillon.fem.geometry.scene_parts import Part, gltf_parts, obj_parts
 from carillon.fem.geometry.three_mf import three_mf_parts
+from carillon.fem.geometry.turning import turned_upright
 from carillon.fem.geometry.volume_files import READERS, is_volume_file, read_volume_mesh
 from carillon.files.paths import require_file
 from carillon.limits import EXTENTS, FARTHEST, MESH_BYTES, UNITS, require_within
@@ -37,7 +38,9 @@ number: archives (zip), parts that hold each other (dae), entities (xaml, dae).
 """
 
 
-def load_surface(mesh: str, unit: float = 1.0, is_sheet: bool = False) -> trimesh.Trimesh:
+def load_surface(
+    mesh: str, unit: float = 1.0, is_sheet: bool = False, up: str | None = None
+) -> trimesh.Trimesh:
     """Load a triangle surface [m], its faces turned alike; it need not be closed or manifold.
 
     Raises UserError if the file is missing, not readable as a mesh, longer than `MESH_BYTES` with
@@ -58,6 +61,8 @@ def load_surface(mesh: str, unit: float = 1.0, is_sheet: bool = False) -> trimes
     is_sheet
         Whether a wall is to follow it: it may then be flat, and its faces stay as they are if they
         are there both ways or cannot be turned alike.
+    up
+        Axis of the file that points up, and is turned to z, see `turned_upright`.
 
     Examples
     --------
@@ -75,7 +80,7 @@ def load_surface(mesh: str, unit: float = 1.0, is_sheet: bool = False) -> trimes
         surface = _turned_alike(mesh, surface, is_sheet)
     if unit != 1.0:
         surface.apply_scale(unit)
-    return surface
+    return turned_upright(surface, up)
 
 
 def parts_of_scene(mesh: str) -> list[Part] | None:

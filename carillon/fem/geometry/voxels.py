@@ -10,6 +10,7 @@ from carillon.errors import UserError
 from carillon.fem.geometry.contacts import one_body
 from carillon.fem.geometry.fill import FILLS, cut_triangles
 from carillon.fem.geometry.grid import Grid, bounding_grid
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.geometry.topology import pieces as label_pieces
 
 COMPONENTS = ("error", "largest")
@@ -106,8 +107,8 @@ def voxelize(
     if model.n_cells == 0:
         raise UserError(
             f"mesh {name!r} at resolution {resolution} fills no voxel: its walls are thinner than "
-            f"a voxel of {model.edge:.3g} m, or it encloses nothing; raise the resolution or "
-            "repair the mesh"
+            f"a voxel of {length_in_words(model.edge)}, or it encloses nothing; raise the "
+            "resolution or repair the mesh"
         )
     labels, sizes = label_pieces(model.filled)
     if len(sizes) > 1 and components == "error":

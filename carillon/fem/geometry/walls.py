@@ -14,6 +14,7 @@ from carillon.fem.geometry.convex import ConvexBodies
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.geometry.offset_bodies import offset_bodies
 from carillon.fem.geometry.sheets import Sheets
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.geometry.surface import load_surface, surface_name
 from carillon.fem.geometry.wall_skin import wall_skin
 
@@ -37,9 +38,9 @@ class WallSize:
         """The wall of a surface, see `Wall.of_surface`."""
         return Wall.of_surface(surface, self.thickness, self.side, name)
 
-    def read(self, mesh: str, unit: float = 1.0) -> Wall:
+    def read(self, mesh: str, unit: float = 1.0, up: str | None = None) -> Wall:
         """The wall of the surface in a file, or `builtin:NAME`, see `load_surface`."""
-        return self.of(load_surface(mesh, unit, is_sheet=True), surface_name(mesh))
+        return self.of(load_surface(mesh, unit, is_sheet=True, up=up), surface_name(mesh))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +95,9 @@ class Wall:
         longest = float(np.ptp(np.asarray(surface.bounds), axis=0).max())
         if not thickness <= longest:
             raise UserError(
-                f"{what}: found a wall of {thickness:g} m about a surface whose longest side is "
-                f"{longest:.3g} m, expected less; see whether both are in the right unit"
+                f"{what}: found a wall of {length_in_words(thickness)} about a surface whose "
+                f"longest side is {length_in_words(longest)}, expected less; see whether both "
+                "are in the right unit"
             )
         sheets = Sheets.of_surface(vertices, faces)
         if sheets.is_closed and sheets.volume < 0.0:
@@ -164,8 +166,8 @@ class Wall:
     def say_filled(self, name: str) -> None:
         """Warn that the wall leaves no hollow in the closed surface that it follows."""
         warn_once(
-            f"mesh {name!r}: a wall of {self.thickness:g} m leaves no hollow, the solid is full; "
-            "see whether its unit is right, or leave out the wall"
+            f"mesh {name!r}: a wall of {length_in_words(self.thickness)} leaves no hollow, the "
+            "solid is full; see whether its unit is right, or leave out the wall"
         )
 
     @property

@@ -44,6 +44,25 @@ export function decaySeconds(dampingPerSecond) {
   return Math.log(1000) / dampingPerSecond;
 }
 
+/** Units of lengths, and the least longest length that is told in each [m]. @type {[string, number, number][]} */
+const LENGTHS = [
+  ["m", 1, 1],
+  ["cm", 0.01, 0.01],
+  ["mm", 0.001, 1e-5],
+  ["\u00b5m", 1e-6, 0],
+];
+
+/**
+ * Lengths, as of the sides of a box, in the unit that suits the longest of them.
+ *
+ * @param {readonly number[]} metres
+ */
+export function lengths(metres) {
+  const longest = Math.max(...metres);
+  const [unit, size] = LENGTHS.find(([, , least]) => longest >= least) ?? ["m", 1];
+  return `${metres.map((each) => Number((each / size).toPrecision(3))).join(" \u00d7 ")} ${unit}`;
+}
+
 /**
  * The largest magnitude of a list; 0 if it is empty.
  *

@@ -28,7 +28,7 @@ const IMPORTANT = [
 /** What regions tell instead, where there are any. */
 const TOLD_BY_REGIONS = ["density", "poisson", "material.young"];
 /** What the page sets elsewhere. */
-const ELSEWHERE = ["mesh", "targets", "regions", "supports"];
+const ELSEWHERE = ["mesh", "unit", "up", "wall", "targets", "regions", "supports"];
 
 /** @type {Record<string, string>} */
 const SECTIONS = {

@@ -85,7 +85,7 @@ export function fillChooser(place, parts, chosen) {
       element("h3", {}, "A mesh file"),
       element("label", {}, "One unit of the file is ", unit),
       element("label", {}, element("span", { className: "hidden" }, "Mesh file"), file),
-      element("p", { className: "quiet" }, "Or drop one anywhere on the page. The surface has to be closed."),
+      element("p", { className: "quiet" }, "Or drop one anywhere on the page. An open surface is filled, unless it gets a wall."),
     ),
     ...(now.projects.length > 0
       ? [

@@ -1,5 +1,6 @@
 /** What lies over the view: how far preparation is, what failed, what to do with an empty page. */
 
+import { lengths } from "../panels/numbers.js";
 import { fillChooser } from "./chooser.js";
 
 /** @typedef {import("../main.js").Parts} Parts */
@@ -58,7 +59,7 @@ export function makeNotices(element, parts, silent) {
     progress.hidden = !underway;
     if (solid && underway) {
       const length = solid.longest_side_m;
-      const size = length ? ` (${Number(length.toPrecision(3))} m long)` : "";
+      const size = length ? ` (${lengths([length])} long)` : "";
       const says = solid.message ?? `${PHASES[solid.phase]}${size}`;
       if (part("#progress-says").textContent !== says) part("#progress-says").textContent = says;
       if (solid.progress === null) bar.removeAttribute("value");
