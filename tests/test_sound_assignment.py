@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sound.clips.targets import Targets
-from sound.design.assignment import Spectrum, assigned, placed
+from sound.design.assignment import SolidSpectrum, assigned, placed
 from sound.design.objective import Objective
 from sound.project.settings import Weights
 
@@ -17,7 +17,7 @@ def targets_of(hertz, amplitudes=None):
 
 def spectrum(hertz, pushed=None):
     hertz = np.array(hertz)
-    return Spectrum(hertz, np.ones((1, len(hertz))) if pushed is None else np.array([pushed]))
+    return SolidSpectrum(hertz, np.ones((1, len(hertz))) if pushed is None else np.array([pushed]))
 
 
 def found(targets, solid):

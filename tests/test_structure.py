@@ -90,13 +90,13 @@ ARROWS = {
     "sound.design": """solver.analysis solver.coarsening solver.distribution solver.files
         solver.linear solver.response solver.subspace sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
-        sound.project sound.synthesis""",
+        sound.design sound.project sound.synthesis""",
     "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement
         solver.response sound sound.project sound.rendering""",
     "sound.scenes.film": "sound sound.scenes",
     "sound.scenes.contact": "sound.scenes",
     "sound.export": """solver.assembly solver.files solver.response solver.verification
-        sound sound.project sound.rendering sound.scenes""",
+        sound sound.clips sound.project sound.rendering sound.scenes""",
     "sound.scenes.audible": "sound.rendering sound.scenes sound.scenes.contact sound.synthesis",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export
         sound.project sound.rendering""",

@@ -103,7 +103,6 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     elif out.exists() and not options.restart:
         initial = read_design(out)
     problem = prepare(project)
-    say(f"{project.solid.mesh}: {lengths_in_words(np.ptp(problem.vertices, axis=0))}")
     if initial is not None:
         require_same_voxels(problem, initial)
         so_far = initial.history["evaluations"][-1:].sum()
@@ -112,7 +111,9 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     if options.watch:
         result = design_on(edited, problem, initial, out, show)
     else:
+        say(f"{project.solid.mesh}: {lengths_in_words(np.ptp(problem.vertices, axis=0))}")
         result = optimise(problem, initial, lambda each: write_design(out, each), show)
+        write_design(out, result)
         result = with_verdict(result)
         write_design(out, result)
     summary = summarise(result)

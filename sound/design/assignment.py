@@ -30,7 +30,7 @@ TWIN = 3e-3
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class SolidSpectrum:
     """Frequencies (M,) [Hz], ascending, of a solid's elastic modes, and how strongly its struck
     points push them, (T, M)."""
 
@@ -38,7 +38,7 @@ class Spectrum:
     pushed: Array
 
 
-def assigned(targets: Targets, shares: Array, solid: Spectrum) -> Targets:
+def assigned(targets: Targets, shares: Array, solid: SolidSpectrum) -> Targets:
     """Targets for the modes of a solid that come nearest to some partials; others are silent.
 
     Each of the lowest modes gets a partial or stays silent; partials that none can have are left

@@ -27,7 +27,7 @@ from solver.files.modes_file import frequencies
 from sound.clips.files import extract_file
 from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.clips.wav import read_wav
-from sound.design.assignment import Spectrum, assigned
+from sound.design.assignment import SolidSpectrum, assigned
 from sound.design.constants import NOTHING, FreeConstants, free_density, free_poisson
 from sound.design.elements import coarsening_of
 from sound.design.material import ReducedMaterial
@@ -188,14 +188,14 @@ def prepare(
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
 
 
-def _spectrum(project: Project, solid: PreparedSolid, strikes: Sequence[Strike]) -> Spectrum:
+def _spectrum(project: Project, solid: PreparedSolid, strikes: Sequence[Strike]) -> SolidSpectrum:
     """The lowest modes of a solid of the material that the search starts from."""
     nothing: Any = None
     setting = solid.setting(project.solid, strikes, nothing)
     with one_thread():
         simulation = setting.simulation(modes=MODES)
         evaluation = simulation.evaluate(np.zeros(solid.material.dimensions))
-    return Spectrum(frequencies(evaluation.eigenvalues), evaluation.pushed)
+    return SolidSpectrum(frequencies(evaluation.eigenvalues), evaluation.pushed)
 
 
 _MEANING: dict[str, Any] = {

@@ -49,7 +49,7 @@ class Likeness:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class DesignVerdict:
     """Whether a design sounds like its clips: `word` is like, near or cannot.
 
     `median_cents` is the median distance of the partials that count, `likeness` how near each clip
@@ -67,8 +67,9 @@ class Verdict:
 
         Examples
         --------
-        >>> Verdict(NEAR, 40.0, (), "the partial at 440 Hz is 80 cents low", "search on").sentence()
-        'near the clip, not like it: the partial at 440 Hz is 80 cents low; search on'
+        >>> verdict = DesignVerdict(NEAR, 40.0, (), "the partial at 440 Hz is low", "search on")
+        >>> verdict.sentence()
+        'near the clip, not like it: the partial at 440 Hz is low; search on'
         """
         begin = {
             LIKE: "like the clip",
@@ -83,7 +84,7 @@ class Verdict:
         return {**asdict(self), "sentence": self.sentence()}
 
 
-def judged(design: Design, clips: Sequence[ModalSound]) -> Verdict:
+def judged(design: Design, clips: Sequence[ModalSound]) -> DesignVerdict:
     """Verdict on a design, by the clips of its targets, one each."""
     solid = SoundingSolid.of_design(design)
     heard = Listening.of_design(design, solid)
@@ -107,7 +108,7 @@ def judged(design: Design, clips: Sequence[ModalSound]) -> Verdict:
     median = float(np.median(np.abs(off)))
     word = _word(median, likeness)
     reason, advice = ("", "") if word == LIKE else _reason(design, clips, solid, off, likeness)
-    return Verdict(word, median, tuple(likeness), reason, advice)
+    return DesignVerdict(word, median, tuple(likeness), reason, advice)
 
 
 def with_verdict(design: Design) -> Design:
