@@ -852,8 +852,16 @@ class Design:
 
     @property
     def target_frequencies(self) -> Array:
-        """Frequencies of the clips' modes (n,) [Hz]."""
-        return self.found.targets.frequencies
+        """Frequencies of the clips' partials (n,) [Hz]; NaN of modes that shall stay silent."""
+        targets = self.found.targets
+        hertz = np.full(len(targets.frequencies), np.nan)
+        hertz[targets.sounding] = targets.frequencies[targets.sounding]
+        return hertz
+
+    @property
+    def verdict(self) -> str:
+        """Whether it sounds like its clips, why not, and what may help; empty if unknown."""
+        return str((self.found.evidence.get("verdict") or {}).get("sentence", ""))
 
     @property
     def young(self) -> Array:
@@ -924,6 +932,7 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
     from sound.design.optimise import optimise
     from sound.design.preparation import prepare
     from sound.project.project import project_of
+    from sound.rendering.verdict import with_verdict
 
     described = {} if project is None else dict(read_yaml(Path(project), "a project"))
     for key, value in keys.items():
@@ -933,7 +942,7 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
         described[key] = _plain_entries(value)
     folder = Path() if project is None else Path(project).parent
     problem = prepare(project_of(described, folder))
-    return Design(optimise(problem, None if initial is None else initial.found))
+    return Design(with_verdict(optimise(problem, None if initial is None else initial.found)))
 
 
 @dataclass(frozen=True, eq=False)

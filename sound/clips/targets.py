@@ -77,7 +77,9 @@ class Targets:
     def shares(self) -> Array:
         """Shares (N,) of the modes in the loudness of the clips, the mean over these."""
         of_clips = [
-            loudness_shares(self.frequencies, self.dampings, row) for row in self.amplitudes
+            loudness_shares(self.frequencies, self.dampings, row)
+            for row in self.amplitudes
+            if row.any()
         ]
         return np.asarray(np.mean(of_clips, axis=0))
 
