@@ -70,8 +70,8 @@ def test_the_summary_tells_mesh_from_voxels_and_names_the_norm(
     command = ["modes", "builtin:plate", "--resolution", resolution, "--modes", 12, "--out", out]
     command += ["--no-estimate", "--discretisation", discretisation]
     told = run_cli("solver", *command, check=True).stdout
-    assert "; mesh 0.24 x " in told and "largest 2-norm residual" in told
-    assert (" m, voxels " in told) == (discretisation == "voxel")
+    assert "; mesh 24 x " in told and "largest 2-norm residual" in told
+    assert (" cm, voxels " in told) == (discretisation == "voxel")
     found = json.loads(run_cli("solver", *command, "--json", check=True).stdout)
     mesh, voxels = found["extents_m"], found["voxel_extents_m"]
     if discretisation == "finite-cell":

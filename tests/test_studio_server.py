@@ -327,7 +327,7 @@ def opened(monkeypatch):
     """What the command opens and serves, which are made up."""
     found: dict[str, object] = {}
 
-    def open_studio(what, workspace):
+    def open_studio(what, workspace, settings):
         found.update(what=what, workspace=workspace)
         return "studio"
 

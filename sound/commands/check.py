@@ -43,23 +43,23 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def comparison(design: Design, fine: FineFrequencies) -> dict[str, Any]:
-    """Targets, coarse and fine frequencies of a design, mode by mode.
+    """Targets, coarse and fine frequencies of a design, mode by mode; silent ones have no target.
 
     Coarse frequencies are those of the coarse modes that have the shapes of the fine ones.
     """
-    from sound.design.pitch import bark, cents, rms_cents
+    from sound.design.pitch import bark, cents, partials_alone, rms_off_partials
 
-    targets = design.targets.frequencies
+    aims, targets = design.targets, design.targets.frequencies
     coarse = design.coarse_frequencies[fine.order]
     return {
-        "target_hz": targets.tolist(),
+        "target_hz": partials_alone(targets, aims),
         "coarse_hz": coarse.tolist(),
         "fine_hz": fine.hertz.tolist(),
-        "coarse_cents": cents(coarse, targets).tolist(),
-        "fine_cents": cents(fine.hertz, targets).tolist(),
-        "fine_bark": (bark(fine.hertz) - bark(targets)).tolist(),
-        "coarse_rms_cents": rms_cents(design.coarse_frequencies, targets),
-        "fine_rms_cents": rms_cents(fine.hertz, targets),
+        "coarse_cents": partials_alone(cents(coarse, targets), aims),
+        "fine_cents": partials_alone(cents(fine.hertz, targets), aims),
+        "fine_bark": partials_alone(bark(fine.hertz) - bark(targets), aims),
+        "coarse_rms_cents": rms_off_partials(design.coarse_frequencies, aims),
+        "fine_rms_cents": rms_off_partials(fine.hertz, aims),
         "voxels": len(design.young),
         "coarse_cells": design.model.mesh.n_cells,
     }
@@ -71,7 +71,10 @@ def _lines(content: dict[str, Any]) -> list[str]:
     lines = ["  ".join(["mode", *(f"{head:>12}" for head in heads)])]
     for mode, row in enumerate(zip(*(content[name] for name in names)), 1):
         digits = (2, 2, 2, 1, 1, 3)
-        columns = [f"{value:12.{places}f}" for value, places in zip(row, digits)]
+        columns = [
+            f"{'silent' if column == 0 else '':>12}" if value is None else f"{value:12.{places}f}"
+            for column, (value, places) in enumerate(zip(row, digits))
+        ]
         lines.append("  ".join([f"{mode:4}", *columns]))
     coarse, fine = content["coarse_rms_cents"], content["fine_rms_cents"]
     lines.append(

@@ -111,7 +111,6 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     if options.watch:
         result = design_on(edited, problem, initial, out, show)
     else:
-        say(f"{project.solid.mesh}: {lengths_in_words(np.ptp(problem.vertices, axis=0))}")
         result = optimise(problem, initial, lambda each: write_design(out, each), show)
         write_design(out, result)
         result = with_verdict(result)

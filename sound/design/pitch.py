@@ -28,6 +28,14 @@ def rms_off_partials(frequencies: Array, targets: Targets) -> float:
     return rms_cents(frequencies[which], targets.frequencies[which])
 
 
+def partials_alone(values: Array, targets: Targets) -> list[float | None]:
+    """Values (N,) of modes, None of those that shall stay silent."""
+    kept: list[float | None] = [None] * len(values)
+    for mode in targets.sounding:
+        kept[mode] = float(values[mode])
+    return kept
+
+
 def common_factor(frequencies: Array, targets: Array) -> float:
     """The factor of frequencies (N,) that brings them nearest to targets (N,), in cents.
 

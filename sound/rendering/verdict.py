@@ -112,11 +112,12 @@ def judged(design: Design, clips: Sequence[ModalSound]) -> DesignVerdict:
 
 
 def with_verdict(design: Design) -> Design:
-    """A design with a verdict in its evidence; without one if that cannot be had."""
+    """A design with a verdict in its evidence; without one, and a warning, if it cannot be had."""
     try:
         verdict = judged(design, clips_of(design))
-    except UserError as error:  # A clip is not there any more: the design is.
-        warn_once(f"no verdict: {error}")
+    except (UserError, ValueError, LookupError, ArithmeticError) as error:
+        # As where a clip is not there any more: the design is.
+        warn_once(f"no verdict on the design: {error}")
         return design
     return replace(design, evidence={**design.evidence, "verdict": verdict.as_dict()})
 

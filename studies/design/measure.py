@@ -13,7 +13,7 @@ from sound.clips.targets import Targets
 from sound.design.objective import fall
 from sound.design.optimise import optimise
 from sound.design.optimisers import OPTIMISERS
-from sound.design.pitch import rms_cents
+from sound.design.pitch import rms_off_partials
 from sound.design.preparation import DesignProblem, prepare
 from sound.design.simulation import Evaluation
 from sound.project.design import Design
@@ -124,7 +124,7 @@ def _outcome(design: Design) -> dict[str, Any]:
         seconds = np.array([check["seconds"] for check in evidence["checks"]])
         costs = np.minimum.accumulate([check["cost"] for check in evidence["checks"]])
     low = np.flatnonzero(costs <= 0.1 * start)
-    targets = design.targets.frequencies
+    targets = design.targets
     return {
         "cost_start": start,
         "cost_end": end,
@@ -133,7 +133,9 @@ def _outcome(design: Design) -> dict[str, Any]:
         "evaluations": evidence["evaluations"],
         "evaluations_per_minute": evidence["evaluations_per_minute"],
         "seconds": evidence["seconds"],
-        "fine_rms_cents": None if design.fine is None else rms_cents(design.frequencies, targets),
+        "fine_rms_cents": None
+        if design.fine is None
+        else rms_off_partials(design.frequencies, targets),
         "workers": evidence["workers"],
         "curve": [[float(s), float(c)] for s, c in zip(seconds, costs, strict=True)],
     }

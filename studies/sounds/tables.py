@@ -128,16 +128,18 @@ def truth(results: SoundResults) -> Iterator[Row]:
     Column("worst_bark", "Largest [bark]", "fraction", "bark"),
 )
 def nearness(results: SoundResults) -> Iterator[Row]:
-    """How far the frequencies of all modes are from their targets: each solid with the factor of
+    """How far the frequencies of all partials are from their targets: each solid with the factor of
     its moduli that is best for it, by least squares of cents."""
-    design, targets = results.design, results.design.targets.frequencies
-    solved = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
+    design, which = results.design, results.design.targets.sounding
+    targets = design.targets.frequencies[which]
+    solved = results.truth.frequencies[RIGID_MODES:]
     states = {
         "before": results.start.frequencies,
         "coarse": design.coarse_frequencies,
         "fine": solved,
     }
-    for state, hertz in states.items():
+    for state, of_all in states.items():
+        hertz = of_all[which]
         scaled = common_factor(hertz, targets) * hertz
         apart, steps = cents(scaled, targets), _bark_difference(scaled, targets)
         yield {

@@ -188,9 +188,12 @@ export interface BankHeader {
   /** Motions of the solid as a whole that nothing resists: 6 of a free one. */
   rigid_motions?: number;
   targets: string[];
-  wanted_hertz: number[] | null;
-  cents: number[] | null;
-  bark: number[] | null;
+  /** Of modes that shall stay silent, null. */
+  wanted_hertz: (number | null)[] | null;
+  cents: (number | null)[] | null;
+  bark: (number | null)[] | null;
+  /** Whether a design sounds like its clips, in words; of other materials, nothing. */
+  verdict?: string | null;
   arrays?: ArrayHeader[];
 }
 

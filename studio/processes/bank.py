@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from sound.clips.targets import Targets
-from sound.design.pitch import bark, cents, rms_off_partials
+from sound.design.pitch import bark, cents, partials_alone, rms_off_partials
 from sound.rendering.clip_level import clip_level
 from sound.rendering.listening import near_weights
 from sound.rendering.solid import struck_amplitudes
@@ -65,9 +65,9 @@ def bank(heard: Heard, positions: Array, aim: Aim | None, header: dict[str, Any]
         struck = gains[aim.vertices]
         errors = {
             "targets": list(targets.names),
-            "wanted_hertz": target_hertz.tolist(),
-            "cents": cents(hertz, target_hertz).tolist(),
-            "bark": (bark(hertz) - bark(target_hertz)).tolist(),
+            "wanted_hertz": partials_alone(target_hertz, targets),
+            "cents": partials_alone(cents(hertz, target_hertz), targets),
+            "bark": partials_alone(bark(hertz) - bark(target_hertz), targets),
             "rms_cents": rms_off_partials(hertz, targets),
         }
     assert dampings is not None

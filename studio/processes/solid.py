@@ -190,6 +190,7 @@ class SolidProcess:
             "cost": made.evidence.get("cost"),
             "checked": bool(made.evidence.get("checks")),
             "rigid_motions": made.model.rigid_modes,
+            "verdict": (made.evidence.get("verdict") or {}).get("sentence"),
         }
         return bank(heard, self._positions, self._aimed(), {**told, **header})
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
-from sound.design.pitch import cents, rms_cents
+from sound.design.pitch import cents, partials_alone, rms_off_partials
 from sound.project.design import Design
 from sound.rendering.listening import Listening, near_weights
 from sound.rendering.solid import SoundingSolid
@@ -39,8 +39,9 @@ def content(design: Design) -> bytes:
         "name": design.name,
         "targets": [{"name": each.name, "vertex": int(each.vertex)} for each in design.strikes],
         "amplitudes": targets.amplitudes.tolist(),
-        "cents": cents(solid.frequencies, targets.frequencies).tolist(),
-        "rms_cents": rms_cents(solid.frequencies, targets.frequencies),
+        # None of modes that shall stay silent.
+        "cents": partials_alone(cents(solid.frequencies, targets.frequencies), targets),
+        "rms_cents": rms_off_partials(solid.frequencies, targets),
         "origin_m": low.tolist(),
         "step_m": step,
         "young_log10_pa": [float(young.min()), wide / STEPS],

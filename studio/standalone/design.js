@@ -5,7 +5,7 @@
  * @property {string} name
  * @property {{name: string, vertex: number}[]} targets
  * @property {number} rmsCents
- * @property {number[]} cents (N) Of each mode, above the clips'.
+ * @property {(number | null)[]} cents (N) Of each mode, above the clips'; null if it shall stay silent.
  * @property {import("../page/types.js").BankHeader} header
  * @property {import("../page/types.js").BankArrays} bank
  * @property {{hertz: Float64Array, dampings: Float64Array, amplitudes: number[][]}} wanted Modes of
@@ -85,7 +85,8 @@ export function readDesign(header, arrays) {
       cost: null,
       rms_cents: header.rms_cents,
       targets: header.targets.map((/** @type {{name: string}} */ { name }) => name),
-      wanted_hertz: [...wanted],
+      // Modes that shall stay silent have none.
+      wanted_hertz: Array.from(wanted, (hertz, mode) => (header.cents[mode] === null ? null : hertz)),
       cents: header.cents,
       bark: null,
     },

@@ -130,8 +130,10 @@ function fill(table, design, wanted, now, decibels) {
   const body = table.createTBody();
   for (const [mode, amplitude] of wanted.entries()) {
     const row = body.insertRow();
-    const hertz = [design.wanted.hertz[mode], design.bank.hertz[mode]];
-    for (const value of [...hertz, design.cents[mode]]) row.insertCell().textContent = told(value);
+    const off = design.cents[mode] ?? null;
+    row.insertCell().textContent = off === null ? "silent" : told(design.wanted.hertz[mode]);
+    row.insertCell().textContent = told(design.bank.hertz[mode]);
+    row.insertCell().textContent = off === null ? "" : told(off);
     for (const level of [amplitude, now[mode]].map(decibels)) {
       row.insertCell().textContent = level < UNHEARD_DECIBELS ? "none" : told(level);
     }

@@ -108,7 +108,6 @@ each(
     f"{INIT} --clips VALUE",
     "nowhere.wav ZOO/{nan,silence,noise}.wav ZOO/box.obj '' .",
 )
-hostile("init of a clip of one mode", f"{INIT} --clips ZOO/tone.wav", "1 mode")
 hostile("init of no clip", f"{INIT} --clips", "--clips")
 hostile("init of a name that is not printed", f"{INIT} --clips 'a\tb.wav'")
 each(

@@ -38,11 +38,14 @@ export function makeCost(element, parts) {
   let checks = [];
   /** Cost on the fine solid of the material that sounds; null if it is not known. @type {number | null} */
   let present = null;
+  /** Whether the design that sounds is like its clips, in words. @type {string | null} */
+  let verdict = null;
   /** @type {import("uplot") | null} */
   let plot = null;
   let isWaiting = false;
 
   const none = make("p", { class: "hint" }, "Optimise, and the cost is drawn here while it falls.");
+  const judged = make("p", { class: "verdict", role: "status", hidden: true });
   const value = make("p", { class: "figure-line" });
   const picture = make("div", { class: "plot", role: "img" });
   const says = make("ul", { class: "says", hidden: true });
@@ -54,10 +57,12 @@ export function makeCost(element, parts) {
     picture,
     says,
   );
-  element.append(none, body);
+  element.append(none, judged, body);
 
   function show() {
     isWaiting = false;
+    judged.hidden = verdict === null;
+    setText(judged, verdict === null ? "" : `Verdict: ${verdict}.`);
     none.hidden = rows.length > 0;
     body.hidden = rows.length === 0;
     const first = rows[0];
@@ -136,6 +141,7 @@ export function makeCost(element, parts) {
 
   connection.onBinary("bank", (header) => {
     present = header.checked ? header.cost : null;
+    verdict = header.verdict ?? null;
     later();
   });
   connection.onEvent("history", (event) => {

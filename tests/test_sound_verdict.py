@@ -1,0 +1,112 @@
+"""Whether a design sounds like its clips, in words."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sound.clips.extraction import ModalSound
+from sound.project.design import Design
+from sound.rendering.solid import SoundingSolid
+from sound.rendering.verdict import CANNOT, LIKE, NEAR, decay_seconds, judged, with_verdict
+from sound.synthesis.sinusoids import damped_sinusoids
+from tests.small_design import small_design
+
+RATE = 22_050
+DAMPING = 9.0
+
+
+def own_sounds() -> Design:
+    """A design whose targets are what it sounds like."""
+    design = small_design()
+    solid = SoundingSolid.of_design(design)
+    positions = np.array([each.position for each in design.strikes])
+    inward = np.array([each.inward for each in design.strikes])
+    levels = solid.amplitudes(positions, inward)
+    targets = replace(
+        design.targets,
+        frequencies=design.frequencies,
+        dampings=np.full(len(design.frequencies), DAMPING),
+        amplitudes=0.2 * levels / levels.max(axis=1, keepdims=True),
+        residuals=(np.zeros(RATE),) * 2,
+        rates=(RATE,) * 2,
+    )
+    return replace(design, targets=targets)
+
+
+def clips_of(design: Design) -> list[ModalSound]:
+    """The clips that a design's targets are of."""
+    targets = design.targets
+    phases, residual = np.zeros(len(targets.frequencies)), np.zeros(RATE)
+    return [
+        ModalSound(targets.frequencies, targets.dampings, row, phases, residual, RATE, {})
+        for row in targets.amplitudes
+    ]
+
+
+def with_targets(design: Design, **changes) -> Design:
+    return replace(design, targets=replace(design.targets, **changes))
+
+
+def test_a_design_that_is_its_clip_is_like_it():
+    design = own_sounds()
+    verdict = judged(design, clips_of(design))
+    assert verdict.word == LIKE and verdict.sentence() == "like the clip"
+    assert verdict.median_cents == 0.0
+    for each in verdict.likeness:
+        assert each.distance_db < 1.0 < each.silence_db
+        assert each.decay_ratio == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("factor", "side"), [(2.0 ** (1 / 12), "low"), (2.0 ** (-1 / 12), "high")])
+def test_a_partial_a_semitone_off_is_named(factor, side):
+    design = own_sounds()
+    hertz = design.targets.frequencies.copy()
+    loudest = int(np.argmax(design.targets.shares))
+    hertz[loudest] *= factor
+    design = with_targets(design, frequencies=hertz)
+    verdict = judged(design, clips_of(design))
+    assert verdict.word != CANNOT
+    assert verdict.median_cents == 0.0
+    reason = judged(with_targets(design, frequencies=factor * design.frequencies), clips_of(design))
+    assert reason.word in (NEAR, CANNOT)
+    assert f"100 cents too {side}" in reason.reason and reason.advice
+
+
+def test_partials_that_no_mode_has_are_named():
+    design = own_sounds()
+    louder = with_targets(
+        design,
+        left_out=np.array([4467.0]),
+        left_out_share=0.6,
+        frequencies=1.0234 * design.frequencies,  # 40 cents
+    )
+    verdict = judged(louder, clips_of(louder))
+    assert "partials at 4467 Hz" in verdict.reason and "more modes" in verdict.advice
+
+
+def test_a_design_that_rings_on_where_the_clip_is_over_is_no_likeness():
+    design = own_sounds()
+    short = with_targets(design, dampings=np.full(len(design.frequencies), 60.0))
+    verdict = judged(design, clips_of(short))
+    assert verdict.word != LIKE and "times longer than the clip" in verdict.reason
+    assert min(each.decay_ratio for each in verdict.likeness) > 3.0
+
+
+def test_a_design_whose_clip_is_gone_is_kept(caplog):
+    design = own_sounds()
+    assert with_verdict(design) is design  # Its settings name no clips.
+    gone = replace(design, settings={**design.settings, "targets": [{"clip": "nowhere.wav"}] * 2})
+    assert with_verdict(gone) is gone
+    silent = [replace(each, amplitudes=0.0 * each.amplitudes) for each in clips_of(design)]
+    with pytest.raises(ValueError, match="silent"):
+        judged(design, silent)
+
+
+@pytest.mark.parametrize("rate", [8_000, 44_100])
+@pytest.mark.parametrize("damping", [2.0, 7.0, 60.0])
+def test_times_of_decay_are_those_of_the_mode(rate, damping):
+    one = np.ones(1)
+    sound = damped_sinusoids(440.0 * one, damping * one, one, 0.0 * one, rate, 4 * rate)
+    assert decay_seconds(sound, rate) == pytest.approx(np.log(1e3) / damping, rel=0.02)
+    assert decay_seconds(np.zeros(100), rate) == 0.0
