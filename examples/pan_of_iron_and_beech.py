@@ -27,8 +27,9 @@ if __name__ == "__main__":
         resolution=24,
         regions=REGIONS,
         targets=[{"name": "rim", "at": [-0.1115, 0.0, 0.036], "clip": "chord.wav"}],
+        modes=4,  # The lowest ones, a tone of the chord each.
         damping={"source": "material"},
-        weights={"amplitude": 1.0},
+        weights={"frequency": 1.0, "amplitude": 1.0},
         optimiser={"evaluations": 600, "seconds": None, "workers": 1},
     )
     ca.write_wav("pan_of_iron_and_beech.wav", design.render(target="rim"))

@@ -174,6 +174,8 @@ def test_extract_command_prints_a_table_and_writes_json(clips, tmp_path, capsys)
     assert [float(line.split()[0]) for line in lines[3:]] == [300.0, 800.0, 1900.0]
     content = json.loads(out.read_text())
     assert content["names"] == ["a", "b"]
+    assert np.round(content["clips"][1]["heard_hz"]).tolist() == [300.0, 1900.0]
+    assert "2 partials are heard and count for a design: 300, 800 Hz" in lines[0]
     np.testing.assert_allclose(content["dampings_per_second"], 5.0, rtol=1e-3)
     np.testing.assert_allclose(content["amplitudes"], [[0.2, 0.1, 0], [0.2, 0, 0.1]], rtol=1e-3)
 

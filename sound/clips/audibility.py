@@ -6,6 +6,7 @@ and Moore, *Hearing Research* 47, 1990), and each is as loud as what the loudnes
 loses without it (Moore, Glasberg and Baer, *J. Audio Eng. Soc.* 45, 1997), summed over time.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -67,6 +68,18 @@ def heard_partials(sound: ModalSound) -> ModalSound:
     enough = int(np.searchsorted(shares[order].cumsum(), ENOUGH)) + 1
     kept = order[:enough][shares[order[:enough]] >= LEAST_SHARE]
     return chosen(merged, np.sort(kept))
+
+
+def heard_in_words(hertz: Iterable[float]) -> str:
+    """Frequencies [Hz] of the partials of a clip that are heard, in words.
+
+    Examples
+    --------
+    >>> heard_in_words([440.0, 990.2])
+    '2 partials are heard and count for a design: 440, 990 Hz'
+    """
+    listed = [f"{each:.0f}" for each in hertz]
+    return f"{len(listed)} partials are heard and count for a design: {', '.join(listed)} Hz"
 
 
 def is_burst(sound: ModalSound) -> Flags:

@@ -73,9 +73,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _content(clips: Sequence[str], sounds: list[ModalSound], targets: Targets) -> dict[str, Any]:
+    from sound.clips.audibility import heard_partials
+
     return {
         "clips": [
-            {"file": clip, "rate_hz": sound.rate, **sound.evidence}
+            {
+                "file": clip,
+                "rate_hz": sound.rate,
+                **sound.evidence,
+                "heard_hz": heard_partials(sound).frequencies.tolist(),
+            }
             for clip, sound in zip(clips, sounds, strict=True)
         ],
         "names": list(targets.names),
@@ -86,13 +93,14 @@ def _content(clips: Sequence[str], sounds: list[ModalSound], targets: Targets) -
 
 
 def _line(clip: dict[str, Any]) -> str:
+    from sound.clips.audibility import heard_in_words
     from sound.clips.extraction import remarks
 
     line = (
         f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
         f"which explain {100.0 * clip['explained']:.2f} % of the energy"
     )
-    return "; ".join([line, *remarks(clip)])
+    return "; ".join([line, heard_in_words(clip["heard_hz"]), *remarks(clip)])
 
 
 def _lines(content: dict[str, Any]) -> list[str]:

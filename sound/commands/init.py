@@ -67,11 +67,14 @@ def run(arguments: argparse.Namespace) -> int:
     values = _solid(options, path.parent)
     surface = _surface(options.mesh, values)
     values["targets"] = _targets(options, surface, path.parent)
+    heard = _heard(options)
     text = project_text(values)
     project_of(parse_yaml(text), path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(_sentence(options, path, surface))
+    for line in heard:
+        print(line)
     return 0
 
 
@@ -122,7 +125,6 @@ def _targets(options: InitOptions, surface: Surface, folder: Path) -> list[dict[
     targets = _at_points(surface, clips, options.unit)
     if options.allow_clipped:
         targets = [target | {"allow_clipped": True} for target in targets]
-    _require_modes(options.clips, options.allow_clipped)
     return targets
 
 
@@ -147,12 +149,16 @@ def _at_points(surface: Surface, clips: Sequence[str], unit: float) -> list[dict
     ]
 
 
-def _require_modes(clips: Sequence[str], allow_clipped: bool) -> None:
-    from sound.clips.files import clip_names, extract_file
-    from sound.clips.targets import share_frequencies
+def _heard(options: InitOptions) -> list[str]:
+    """A line for each clip: the partials that count."""
+    from sound.clips.audibility import heard_in_words, heard_partials
+    from sound.clips.files import extract_file
 
-    sounds = [extract_file(clip, visible=True, allow_clipped=allow_clipped) for clip in clips]
-    share_frequencies(clip_names(clips), sounds, "auto")
+    lines = []
+    for clip in options.clips or ():
+        sound = extract_file(clip, visible=True, allow_clipped=options.allow_clipped)
+        lines.append(f"{clip}: {heard_in_words(heard_partials(sound).frequencies)}")
+    return lines
 
 
 def _seen_from(folder: Path, path: str) -> str:

@@ -81,7 +81,8 @@ class Project:
     modes: Annotated[int, between(2, 10_000)] | Literal["auto"] = option(
         "auto",
         "elastic modes whose frequencies and amplitudes are controlled, relative to the first; "
-        "auto takes those of the clips that stand apart and are heard, the 30 strongest at most "
+        "auto takes the partials that are heard of the clips, 30 at most, and modes between them "
+        "that stay silent "
         "[1]",
     )
     targets: Annotated[tuple[TargetEntry, ...], Within(min_length=1, max_length=100)] = option(

@@ -29,8 +29,9 @@ LOUD_DECIBELS = 12.0
 """Error of a partial's level [dB] that is told."""
 GAIN = 0.05
 """Share of the cost that two further checks take off a search that gets on."""
-FAR_CENTS = 50.0
-"""Distance of a partial [cents] that is told."""
+FAR_CENTS, FAR_SHARE = 50.0, 0.2
+"""Distance of a partial [cents] that is told, and share of such partials in the loudness from which
+on a design is not like its clip."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,8 @@ def judged(design: Design, clips: Sequence[ModalSound]) -> DesignVerdict:
     which = design.targets.sounding
     off = cents(design.frequencies, design.targets.frequencies)[which]
     median = float(np.median(np.abs(off)))
-    word = _word(median, likeness)
+    far = design.targets.shares[which][np.abs(off) > FAR_CENTS].sum()
+    word = _word(median, float(far), likeness)
     reason, advice = ("", "") if word == LIKE else _reason(design, clips, solid, off, likeness)
     return DesignVerdict(word, median, tuple(likeness), reason, advice)
 
@@ -155,14 +157,14 @@ def decay_seconds(sound: Array, rate: int) -> float:
     return float(-60.0 / slope)
 
 
-def _word(median: float, likeness: Sequence[Likeness]) -> str:
+def _word(median: float, far: float, likeness: Sequence[Likeness]) -> str:
     if any(each.distance_db > each.silence_db - NEARER_DECIBELS for each in likeness):
         return CANNOT
     alike = all(
         each.distance_db <= LIKE_DECIBELS and _ratio(each.decay_ratio) <= LIKE_RATIO
         for each in likeness
     )
-    return LIKE if alike and median <= LIKE_CENTS else NEAR
+    return LIKE if alike and median <= LIKE_CENTS and far < FAR_SHARE else NEAR
 
 
 def _ratio(value: float) -> float:
