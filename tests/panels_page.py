@@ -103,6 +103,7 @@ def bank(
     rigid_motions: int = 6,
     cost: float = 0.4,
     checked: bool = False,
+    **more: Any,
 ) -> bytes:
     """The bank of a triangle whose modes are a little off."""
     told = {
@@ -122,6 +123,7 @@ def bank(
         "rms_cents": float(np.sqrt(np.mean((1200 * np.log2(hertz / WANTED)) ** 2))),
         "targets": ["rim", "handle"],
         **(told if wanted else dict.fromkeys(told)),
+        **more,
     }
     arrays = {
         "hertz": ("f8", hertz),

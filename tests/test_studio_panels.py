@@ -443,6 +443,17 @@ def test_the_cost_is_drawn_and_told(panels, page):
     expect(page.locator("#panel-cost .plot")).to_be_hidden()
 
 
+def test_a_verdict_and_partials_without_a_mode_are_told(panels, page):
+    panels.tell(bank(verdict="near the clip, not like it", left_out_hz=[812.4, 1400.0]))
+    cost = page.locator("#panel-cost")
+    expect(cost.locator(".verdict")).to_have_text("Verdict: near the clip, not like it.")
+    told = "No mode of this solid can have the clips' partials at 812, 1400 Hz: they are left out."
+    expect(cost.get_by_text(told)).to_be_visible()
+    panels.tell(bank())
+    expect(cost.locator(".verdict")).to_be_hidden()
+    expect(cost.get_by_text("they are left out")).to_be_hidden()
+
+
 def test_a_cost_of_any_size_is_drawn(panels):
     """An axis that begins at 0.0095, a little below a power of ten, is one."""
     panels.tell(progress(0.5, 9.18) | {"amplitude_cost": 0.01427, "regulariser": 0.5})

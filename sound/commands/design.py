@@ -34,6 +34,8 @@ SLOW = ("trimesh", "sound.design.optimise")
 """Modules that take seconds to load and that `--help` does not need."""
 _COSTS = ("cost_start", "cost", "frequency_cost", "amplitude_cost")
 _EFFORT = ("seconds", "evaluations", "evaluations_per_minute", "workers", "method")
+FAR_DAMPINGS = 1.5
+"""Factor by which the dampings of a material are, in the median, far from those of the clips."""
 SHOWN_EVERY = 1.0
 """Time between two progress lines on a terminal [s]."""
 
@@ -178,6 +180,8 @@ def summarise(design: Design) -> dict[str, Any]:
         "extents_m": np.ptp(design.surface_vertices, axis=0).tolist(),
         "modes": len(design.frequencies),
         "partials": len(which),
+        "left_out_hz": [] if targets.left_out is None else targets.left_out.tolist(),
+        "left_out_share_of_loudness": targets.left_out_share,
         "targets": [strike.name for strike in design.strikes],
         "target_distances_m": [strike.distance for strike in design.strikes],
         "frequency_error_median_cents": float(np.median(off)),
@@ -191,6 +195,7 @@ def summarise(design: Design) -> dict[str, Any]:
         "young_max_pa": float(design.young.max()),
         "density_kg_per_m3": design.model.density,
         "poisson": design.model.poisson,
+        "damping_source": design.settings.get("damping", {}).get("source"),
         "damping_ratios": ratios.tolist(),
         "regions": _regions(design),
         "loss_factors": [] if loss is None else np.unique(loss).tolist(),
@@ -232,6 +237,7 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"median error {summary['frequency_error_median_cents']:.1f} cents, worst "
             f"{summary['frequency_error_max_cents']:.1f} cents; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",
+            *_left_out_sentence(summary),
             _rms_sentence(summary),
             *_material_sentences(design, summary),
             _damping_sentence(summary),
@@ -239,6 +245,17 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             f"design: {out}; solid {lengths_in_words(summary['extents_m'])}",
         ]
     )
+
+
+def _left_out_sentence(summary: dict[str, Any]) -> list[str]:
+    hertz = summary["left_out_hz"]
+    if not hertz:
+        return []
+    listed = ", ".join(f"{each:.0f}" for each in hertz)
+    share = summary["left_out_share_of_loudness"]
+    return [
+        f"left out, since no mode can have them: partials at {listed} Hz, {share:.0%} of loudness"
+    ]
 
 
 def _rms_sentence(summary: dict[str, Any]) -> str:
@@ -278,10 +295,18 @@ def _damping_sentence(summary: dict[str, Any]) -> str:
     factors, by = summary["loss_factors"], "the regions' own damping"
     if factors:
         by = f"loss factors of {min(factors):.2g} to {max(factors):.2g}"
-    return (
+    text = (
         f"dampings by {by}: {median:.2f} of "
         f"the clips' (median), half of them {low:.2f} to {high:.2f}"
     )
+    far = max(median, 1.0 / median) > FAR_DAMPINGS
+    if summary["damping_source"] == "material" and far:
+        rings = "shorter" if median > 1.0 else "longer"
+        text += (
+            f"; it rings {rings} than its clips: take their dampings (damping: {{source: clips}}), "
+            "another damping of the regions, or more regions of the damping"
+        )
+    return text
 
 
 def _require_one_rank() -> None:

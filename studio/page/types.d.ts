@@ -192,6 +192,8 @@ export interface BankHeader {
   wanted_hertz: (number | null)[] | null;
   cents: (number | null)[] | null;
   bark: (number | null)[] | null;
+  /** Partials of the clips that no mode of the solid can have. */
+  left_out_hz?: number[];
   /** Whether a design sounds like its clips, in words; of other materials, nothing. */
   verdict?: string | null;
   arrays?: ArrayHeader[];

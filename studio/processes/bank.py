@@ -51,7 +51,7 @@ def bank(heard: Heard, positions: Array, aim: Aim | None, header: dict[str, Any]
     dampings = None if heard.dampings is None else heard.dampings[order]
     gains = struck_amplitudes(pushed, hertz)
     errors: dict[str, Any] = {"targets": [], "wanted_hertz": None, "cents": None, "bark": None}
-    errors["rms_cents"] = None
+    errors |= {"rms_cents": None, "left_out_hz": []}
     struck = np.empty((0, len(hertz)))
     if aim is None:
         loudest = float(gains.sum(axis=1).max())
@@ -69,6 +69,7 @@ def bank(heard: Heard, positions: Array, aim: Aim | None, header: dict[str, Any]
             "cents": partials_alone(cents(hertz, target_hertz), targets),
             "bark": partials_alone(bark(hertz) - bark(target_hertz), targets),
             "rms_cents": rms_off_partials(hertz, targets),
+            "left_out_hz": [] if targets.left_out is None else targets.left_out.tolist(),
         }
     assert dampings is not None
     return pack(

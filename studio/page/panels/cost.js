@@ -40,6 +40,8 @@ export function makeCost(element, parts) {
   let present = null;
   /** Whether the design that sounds is like its clips, in words. @type {string | null} */
   let verdict = null;
+  /** Partials of the clips that no mode can have. @type {number[]} */
+  let leftOut = [];
   /** @type {import("uplot") | null} */
   let plot = null;
   let isWaiting = false;
@@ -57,12 +59,16 @@ export function makeCost(element, parts) {
     picture,
     says,
   );
-  element.append(none, judged, body);
+  const missing = make("p", { class: "hint", hidden: true });
+  element.append(none, judged, missing, body);
 
   function show() {
     isWaiting = false;
     judged.hidden = verdict === null;
     setText(judged, verdict === null ? "" : `Verdict: ${verdict}.`);
+    missing.hidden = leftOut.length === 0;
+    const hertz = leftOut.map((each) => each.toFixed(0)).join(", ");
+    setText(missing, `No mode of this solid can have the clips' partials at ${hertz} Hz: they are left out.`);
     none.hidden = rows.length > 0;
     body.hidden = rows.length === 0;
     const first = rows[0];
@@ -142,6 +148,7 @@ export function makeCost(element, parts) {
   connection.onBinary("bank", (header) => {
     present = header.checked ? header.cost : null;
     verdict = header.verdict ?? null;
+    leftOut = header.left_out_hz ?? [];
     later();
   });
   connection.onEvent("history", (event) => {
