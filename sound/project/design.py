@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Integers
 from carillon.errors import UserError
+from carillon.fem.geometry.turning import remaining_turn
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.regions import RegionOf
 from solver.files.modes_file import frequencies
@@ -131,6 +132,14 @@ class Design:
         if self.damping is None or source == "clips":
             return self.targets.dampings
         return self.damping.dampings
+
+    def remaining_turn(self, up: str | None = None) -> Array | None:
+        """Rotation (3, 3) that it still needs for z to point up; None if it stands upright.
+
+        `up` is the axis of its mesh file that points up, by default as
+        `carillon.fem.geometry.turning.remaining_turn` says.
+        """
+        return remaining_turn(str(self.settings.get("mesh", "")), up, self.settings.get("up"))
 
     def young_near(self, positions: Array) -> Array:
         """Moduli (p,) [Pa] of the fine cells that are nearest to positions (p, 3) [m]."""
