@@ -65,7 +65,7 @@ def node_rotation(turn: Array | None = None) -> list[float]:
 
     Examples
     --------
-    >>> np.round(node_rotation(), 4).tolist()
+    >>> [round(each, 4) for each in node_rotation()]
     [-0.7071, 0.0, 0.0, 0.7071]
     >>> node_rotation(upright_rotation("y"))
     [0.0, 0.0, 0.0, 1.0]
@@ -74,7 +74,7 @@ def node_rotation(turn: Array | None = None) -> list[float]:
 
     z_to_y = upright_rotation("y").T
     whole = z_to_y if turn is None else z_to_y @ turn
-    return (Rotation.from_matrix(whole).as_quat() + 0.0).tolist()
+    return (Rotation.from_matrix(whole).as_quat(canonical=True) + 0.0).tolist()
 
 
 def write_asset(path: str | Path, document: dict[str, Any], data: bytes, binary: bool) -> None:
