@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_PREFIX, in_folder
 from carillon.composition.entries import RegionEntry, SupportEntry
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.errors import UserError
@@ -36,8 +36,6 @@ SOURCES = ("design", "modes", "mesh", "radius")
 """What an object may be, one of them."""
 FILES = ("design", "modes", "mesh", "heard_modes")
 """Keys of an object that name files."""
-REGION_FILES = ("mesh", "labels")
-"""Keys of a region that name files."""
 GROUND_NAME = "ground"
 """What lists and scenes call the floor."""
 STANDARD_MATERIAL = "plastic"
@@ -427,13 +425,9 @@ class Scene:
     def files(self) -> list[str]:
         """Files that it is made from."""
         named = [getattr(each, key) for each in self.objects for key in FILES]
-        named += [
-            getattr(region, key)
-            for each in self.objects
-            for region in each.regions
-            for key in REGION_FILES
-        ]
-        return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
+        files = [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
+        regions = [region for each in self.objects for region in each.regions]
+        return files + [name for region in regions for name in region.files]
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -457,21 +451,7 @@ def _in_folder(scene: Scene, folder: Path) -> Scene:
     objects = []
     for each in scene.objects:
         named = {key: getattr(each, key) for key in FILES}
-        files: Any = {
-            key: str(folder / name)
-            for key, name in named.items()
-            if name is not None and not name.startswith(BUILTIN_PREFIX)
-        }
-        regions = tuple(_region_in_folder(region, folder) for region in each.regions)
+        files: Any = {key: in_folder(name, folder) for key, name in named.items() if name}
+        regions = tuple(region.in_folder(folder) for region in each.regions)
         objects.append(replace(each, **files, regions=regions))
     return replace(scene, objects=tuple(objects))
-
-
-def _region_in_folder(region: RegionEntry, folder: Path) -> RegionEntry:
-    named = {key: getattr(region, key) for key in REGION_FILES}
-    files: Any = {
-        key: str(folder / name)
-        for key, name in named.items()
-        if name is not None and not name.startswith(BUILTIN_PREFIX)
-    }
-    return replace(region, **files)
