@@ -21,15 +21,18 @@ from solver.response.points import interpolation
 from solver.verification.audit import audit
 from solver.verification.comparison import compare_files
 from sound.__main__ import main
+from sound.export.embedded import write_embedded
 from sound.export.gltf import EXTENSION, PHYSICS, write_gltf
 from sound.export.gltf_surface import colours_of, shaded
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
+from sound.scenes.bodies import bodies_of
 from sound.synthesis.sinusoids import Bank, ring
 from tests.gltf_files import accessor, read_gltf, rms, sound_of, validated
 from tests.programs import run
+from tests.scenes import scene
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.solids import box_mesh
 
@@ -157,6 +160,13 @@ def test_a_design_of_a_turned_mesh_is_not_turned_again(tmp_path, settings, up, h
     write_gltf(tmp_path / "pan.glb", design, True, up)
     loaded = trimesh.load(tmp_path / "pan.glb").to_geometry()
     assert np.ptp(loaded.bounds, axis=0)[1] == pytest.approx(SIDES[height])
+    write_embedded(tmp_path / "pan.h5", design, {})
+    assert read_modes(tmp_path / "pan.h5").up == settings.get("up")
+    write_design(tmp_path / "design.h5", design)
+    for file in ({"design": "design.h5"}, {"modes": "pan.h5"}):
+        path = {key: str(tmp_path / name) for key, name in file.items()}
+        (body,) = bodies_of(scene({"name": "pan", "up": up, **path}).objects)
+        assert np.ptp(body.shape.vertices, axis=0)[2] == pytest.approx(SIDES[height])
 
 
 def test_gltf_has_normals_and_the_material_as_colours(folder):
