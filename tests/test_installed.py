@@ -112,8 +112,9 @@ def test_rooms_start_processes_of_their_own(installed, tmp_path):
         "    ca.write_wav('clip.wav', clip, 8000)\n"
         "    target = dict(name='end', vertex=0, clip='clip.wav')\n"
         "    settings = dict(evaluations=4, workers=2)\n"
-        "    print(len(ca.design(mesh='builtin:bar', resolution=16, coarsen='none',\n"
-        "                        targets=[target], optimiser=settings).frequencies))\n"
+        "    found = ca.design(mesh='builtin:bar', resolution=16, coarsen='none',\n"
+        "                      targets=[target], optimiser=settings)\n"
+        "    print(np.isfinite(found.target_frequencies).sum())\n"
     )
     assert installed("search.py").stdout == "2\n"
 

@@ -222,18 +222,8 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     volume = 4.0 / 3.0 * np.pi * radius**3
     mass = volume * entry.made_of.density
     moments = np.full(3, 0.4 * mass * radius**2)
-    return ObjectSolid(
-        MassProperties(mass, np.zeros(3), moments, np.eye(3)),
-        np.asarray(sphere.vertices),
-        np.asarray(sphere.faces),
-        np.full(len(sphere.vertices), entry.made_of.young),
-        entry.made_of.poisson,
-        (entry.made_of,),
-        None,
-        volume,
-        find,
-        radius=radius,
-    )
+    rigid = MassProperties(mass, np.zeros(3), moments, np.eye(3))
+    return _of_one_material(entry, rigid, sphere, volume, find, radius)
 
 
 def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
@@ -250,16 +240,31 @@ def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     solid = _Scaled(SolidSurface.read(mesh, unit, wall, entry.mesh_up).solid, entry, size)
     rigid = solid.rigid
     surface.apply_scale(solid.factor)
+    volume = rigid.mass / entry.made_of.density
+    return _of_one_material(entry, rigid, surface, volume, solid.sounding if entry.count else None)
+
+
+def _of_one_material(
+    entry: ObjectEntry,
+    rigid: MassProperties,
+    surface: Surface,
+    volume: float,
+    find: Callable[[], Sounding] | None,
+    radius: float | None = None,
+) -> ObjectSolid:
+    """The solid inside a surface, of the object's own material."""
+    material = entry.made_of
     return ObjectSolid(
         rigid,
         np.asarray(surface.vertices),
         np.asarray(surface.faces),
-        np.full(len(surface.vertices), entry.made_of.young),
-        entry.made_of.poisson,
-        (entry.made_of,),
+        np.full(len(surface.vertices), material.young),
+        material.poisson,
+        (material,),
         None,
-        rigid.mass / entry.made_of.density,
-        solid.sounding if entry.count else None,
+        volume,
+        find,
+        radius=radius,
     )
 
 
