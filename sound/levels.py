@@ -92,9 +92,8 @@ def end_dbfs(samples: Array, rate: int) -> float:
 def faded(samples: Array, rate: int, seconds: float | None = None) -> tuple[Array, float]:
     """Samples (s,) or (s, c) with a fade at the end, and the length of the fade [s].
 
-    The fade is half a cosine over the last `seconds`; the last sample is 0.  If None, it is a
-    tenth of the sound, `LONGEST_FADE` at most, and there is none if the end is not louder than
-    `END_DBFS`.
+    The fade is half a cosine over the last `seconds`; the last sample is 0.  If None, it is as long
+    as `fade_of_ringing` says, and there is none if the end is not louder than `END_DBFS`.
 
     Examples
     --------
@@ -105,13 +104,26 @@ def faded(samples: Array, rate: int, seconds: float | None = None) -> tuple[Arra
     if seconds is None:
         if end_dbfs(samples, rate) <= END_DBFS:
             return samples, 0.0
-        seconds = min(LONGEST_FADE, FADE_SHARE * len(samples) / rate)
+        seconds = fade_of_ringing(len(samples) / rate)
     count = min(len(samples), round(seconds * rate))
     if count == 0:
         return samples, 0.0
     gains = np.ones(len(samples))
     gains[-count:] = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, count + 1) / count)
     return (samples.T * gains).T, count / rate
+
+
+def fade_of_ringing(seconds: float) -> float:
+    """Length [s] of the fade of a sound of some `seconds` that still rings at its end.
+
+    It is a tenth of the sound, `LONGEST_FADE` at most.
+
+    Examples
+    --------
+    >>> fade_of_ringing(2.0), fade_of_ringing(30.0)
+    (0.2, 0.5)
+    """
+    return min(LONGEST_FADE, FADE_SHARE * seconds)
 
 
 def limiting_gains(samples: Array, rate: int) -> Array:

@@ -71,10 +71,14 @@ def test_one_name_is_installed(site):
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_every_module_is_in_the_wheel(room, site):
+    """But not the tests that lie beside the modules of studies."""
     installed = site / "carillon" / "_rooms"
     of_room = installed.parent if room == "carillon" else installed / room
     made = {path.relative_to(CHECKOUT / room) for path in (CHECKOUT / room).rglob("*.py")}
-    assert {path for path in made if not (of_room / path).is_file()} == set()
+    found = {path.relative_to(of_room) for path in of_room.rglob("*.py")}
+    if room == "carillon":
+        found = {path for path in found if path.parts[0] != "_rooms"}
+    assert found == {path for path in made if not path.name.startswith(("test_", "conftest"))}
 
 
 @pytest.mark.parametrize("name", ["solver", "workflow", "sound"])
@@ -108,8 +112,9 @@ def test_rooms_start_processes_of_their_own(installed, tmp_path):
         "    ca.write_wav('clip.wav', clip, 8000)\n"
         "    target = dict(name='end', vertex=0, clip='clip.wav')\n"
         "    settings = dict(evaluations=4, workers=2)\n"
-        "    print(len(ca.design(mesh='builtin:bar', resolution=16, coarsen='none',\n"
-        "                        targets=[target], optimiser=settings).frequencies))\n"
+        "    found = ca.design(mesh='builtin:bar', resolution=16, coarsen='none',\n"
+        "                      targets=[target], optimiser=settings)\n"
+        "    print(np.isfinite(found.target_frequencies).sum())\n"
     )
     assert installed("search.py").stdout == "2\n"
 

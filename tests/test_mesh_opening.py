@@ -9,6 +9,7 @@ import trimesh
 import yaml
 
 import carillon as ca
+from carillon.command_line.logs import warn_once
 from carillon.composition.entries import RegionEntry, SolidFrame
 from carillon.errors import UserError
 from carillon.fem.geometry import load_surface
@@ -170,6 +171,23 @@ def test_a_gltf_solid_that_was_turned_is_not_turned_again_in_a_scene(tmp_path):
         entry = {"name": "board", "modes": out, "material": "steel"}
         (body,) = bodies_of(scene(objects=[entry]).objects)
         assert np.ptp(body.shape.vertices, axis=0)[2] == pytest.approx(0.02)
+        # The axis that the scene names is one of the mesh file, whatever was turned before.
+        (body,) = bodies_of(scene(objects=[entry | {"up": "-x"}]).objects)
+        assert np.ptp(body.shape.vertices, axis=0) == pytest.approx([0.1, 0.02, 0.4])
+
+
+@pytest.mark.parametrize("ending, given", [("obj", {"up": "y"}), ("glb", {})])
+def test_regions_of_a_scene_are_in_the_turned_axes(tmp_path, ending, given):
+    file = tmp_path / f"board.{ending}"
+    BOX.export(file)
+    regions = [
+        {"name": "low", "material": "iron", "where": "z <= 0.01"},
+        {"name": "top", "material": "beech", "where": "z > 0.01"},
+    ]
+    entry = {"name": "board", "mesh": str(file), "regions": regions, "count": 0, **given}
+    (body,) = bodies_of(scene(objects=[entry]).objects)
+    assert np.ptp(body.shape.vertices, axis=0) == pytest.approx([0.4, 0.1, 0.02])
+    assert 0.0 < body.centre[2] < 0.01 and body.turn is None
 
 
 # What is told -------------------------------------------------------------------------------------
@@ -183,8 +201,28 @@ def test_an_open_mesh_is_said_to_be_filled_and_a_shell_proposed(bowl, caplog):
     assert not hints(caplog)
 
 
+def test_a_scene_tells_all_doubts_by_the_keys_that_mend_them(tmp_path, caplog):
+    mesh = tmp_path / f"{tmp_path.name}.ply"
+    large = BOX.copy().apply_scale(1000.0)
+    trimesh.Trimesh(large.vertices, large.faces[1:], process=False).export(mesh)
+    entry = {"name": "board", "mesh": str(mesh), "material": "steel", "count": 0}
+    for regions in ({}, {"regions": [{"name": "all", "material": "steel"}]}):
+        warn_once.cache_clear()
+        bodies_of(scene(objects=[entry | regions]).objects)
+        unit, filled, up = hints(caplog)
+        assert "(unit: mm) it is 40 cm" in unit and "give wall: 5m," in filled
+        assert "up: y stands it up" in up and "--" not in unit + filled + up
+    warn_once.cache_clear()
+    mended = {"wall": 0.002, "up": "z"}
+    bodies_of(scene(objects=[entry | {"size": 0.4} | mended]).objects)
+    bodies_of(scene(objects=[entry | {"unit": "mm"} | mended]).objects)
+    assert not hints(caplog)
+
+
 def test_nothing_is_said_of_a_built_in_object(caplog):
     build_problem(ProblemOptions("builtin:bell", 12, unit=0.01))
+    entry = {"name": "bell", "mesh": "builtin:bell", "unit": 0.1, "material": "steel", "count": 0}
+    bodies_of(scene(objects=[entry]).objects)
     assert not hints(caplog)
 
 

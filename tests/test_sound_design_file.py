@@ -104,6 +104,8 @@ SETTINGS = {
     '{"unit": 0}': "unit",
     '{"unit": NaN}': "unit",
     '{"unit": true}': "unit",
+    '{"up": "north"}': "up",
+    '{"up": []}': "up",
     '{"material": 5}': "material",
     '{"damping": []}': "damping",
     '{"damping": {"source": ["clips"]}}': "damping.source",

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -12,6 +13,7 @@ import trimesh
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import fine_model, mass_properties
 from carillon.fem.regions import Regions
+from carillon.parameters.quantities import UP_AXES
 from solver.coarsening.choice import make_coarsening
 from solver.coarsening.model import build_model
 from solver.files.modes_file import read_modes
@@ -19,15 +21,18 @@ from solver.response.points import interpolation
 from solver.verification.audit import audit
 from solver.verification.comparison import compare_files
 from sound.__main__ import main
-from sound.export.gltf import EXTENSION, PHYSICS
+from sound.export.embedded import write_embedded
+from sound.export.gltf import EXTENSION, PHYSICS, write_gltf
 from sound.export.gltf_surface import colours_of, shaded
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.solid import SoundingSolid
+from sound.scenes.bodies import bodies_of
 from sound.synthesis.sinusoids import Bank, ring
 from tests.gltf_files import accessor, read_gltf, rms, sound_of, validated
 from tests.programs import run
+from tests.scenes import scene
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.solids import box_mesh
 
@@ -127,13 +132,41 @@ def test_gltf_is_the_surface(folder, name):
     np.testing.assert_allclose(loaded.bounds, [[0, 0, -y], [x, z, 0]], atol=1e-7)
 
 
-@pytest.mark.parametrize("up", ["x", "y", "z"])
+@pytest.mark.parametrize("up", UP_AXES)
 def test_the_axis_that_points_up_becomes_y(folder, tmp_path, up):
-    words = ["--up", up, "--out", str(tmp_path / "pan.glb")]
+    words = [f"--up={up}", "--out", str(tmp_path / "pan.glb")]
     assert main(["export", str(folder / "design.h5"), *words]) == 0
     loaded = trimesh.load(tmp_path / "pan.glb").to_geometry()
-    assert np.ptp(loaded.bounds, axis=0)[1] == pytest.approx(SIDES["xyz".index(up)])
+    height = SIDES["xyz".index(up[-1])]
+    # The box begins at the origin of its own axes.
+    heights = [-height, 0.0] if up.startswith("-") else [0.0, height]
+    assert loaded.bounds[:, 1] == pytest.approx(heights, abs=1e-7)
     assert loaded.volume == pytest.approx(np.prod(SIDES), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "settings, up, height",
+    [
+        ({"mesh": "pan.glb"}, None, 1),
+        ({"mesh": "pan.glb", "up": "y"}, None, 2),  # was turned: z of the solid was y of the file
+        ({"mesh": "pan.glb", "up": "y"}, "y", 2),
+        ({"mesh": "pan.glb", "up": "y"}, "z", 1),  # z of the file became -y of the solid
+        ({"mesh": "pan.obj", "up": "x"}, None, 2),
+    ],
+)
+def test_a_design_of_a_turned_mesh_is_not_turned_again(tmp_path, settings, up, height):
+    design = small_design()
+    design = replace(design, settings={**design.settings, "up": None, **settings})
+    write_gltf(tmp_path / "pan.glb", design, True, up)
+    loaded = trimesh.load(tmp_path / "pan.glb").to_geometry()
+    assert np.ptp(loaded.bounds, axis=0)[1] == pytest.approx(SIDES[height])
+    write_embedded(tmp_path / "pan.h5", design, {})
+    assert read_modes(tmp_path / "pan.h5").up == settings.get("up")
+    write_design(tmp_path / "design.h5", design)
+    for file in ({"design": "design.h5"}, {"modes": "pan.h5"}):
+        path = {key: str(tmp_path / name) for key, name in file.items()}
+        (body,) = bodies_of(scene({"name": "pan", "up": up, **path}).objects)
+        assert np.ptp(body.shape.vertices, axis=0)[2] == pytest.approx(SIDES[height])
 
 
 def test_gltf_has_normals_and_the_material_as_colours(folder):

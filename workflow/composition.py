@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from carillon.arrays import Surface
-from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.composition.entries import (
     CompositionEntry,
     SupportEntry,
@@ -48,6 +47,5 @@ def files_of(regions: str) -> list[str]:
     Raises UserError if it is of no use.
     """
     entries = read_composition(regions).regions
-    named = [name for each in entries for name in (each.mesh, each.labels) if name]
-    inside = [name for name in named if not name.startswith(BUILTIN_PREFIX)]
+    inside = [name for each in entries for name in each.files]
     return list(dict.fromkeys(path_word(Path(regions).parent / name) for name in inside))

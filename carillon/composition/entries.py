@@ -10,6 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from carillon.arrays import Surface
+from carillon.builtin_names import BUILTIN_PREFIX, in_folder
 from carillon.composition.composition import AxesAt, Composition, MaterialRegion, axes_about
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.composition.painted import Painted
@@ -130,6 +131,18 @@ class RegionEntry:
             raise ValueError("expected radial or pith, found both")
 
     @property
+    def files(self) -> list[str]:
+        """Files that it names; built-in solids are none."""
+        named = (self.mesh, self.labels)
+        return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
+
+    def in_folder(self, folder: Path) -> RegionEntry:
+        """The same with its files, which are relative to a folder, as the working directory has."""
+        named = {"mesh": self.mesh, "labels": self.labels}
+        there = {key: in_folder(name, folder) for key, name in named.items() if name}
+        return replace(self, **there)  # type: ignore[arg-type]
+
+    @property
     def _material(self) -> NamedMaterial | None:
         return None if self.material is None else named_material(self.material)
 
@@ -182,7 +195,7 @@ class RegionEntry:
                 )
             return Box(low, high)
         if self.labels is not None and self.label is not None:
-            return _labelled(_path(self.labels, solid.folder), self.label, self.unit, solid)
+            return _labelled(in_folder(self.labels, solid.folder), self.label, self.unit, solid)
         if self.mesh is not None:
             own = self.own_surface(solid.folder, solid.up)
             return ClosedSurface(_closed(own, self.name))
@@ -198,7 +211,7 @@ class RegionEntry:
         from carillon.fem.geometry import load_surface  # Its import takes long.
 
         assert self.mesh is not None
-        path = _path(self.mesh, folder)
+        path = in_folder(self.mesh, folder)
         if self.part is not None:
             return _part(path, self.part, self.unit, self.name, up)
         return load_surface(path, self.unit, up=up)
@@ -321,10 +334,6 @@ class CompositionEntry:
         Raises UserError as `RegionEntry.row` does.
         """
         return all(each.row().is_isotropic for each in self.regions)
-
-
-def _path(file: str, folder: Path) -> str:
-    return file if file.startswith("builtin:") else str(folder / file)
 
 
 def _part(path: str, name: str, unit: float, region: str, up: str | None) -> Surface:

@@ -9,6 +9,7 @@ import numpy as np
 
 from carillon.fem.geometry.faces import boundary_faces, corner_values
 from carillon.fem.geometry.hexmesh import HexMesh
+from carillon.fem.geometry.turning import upright_rotation
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -50,7 +51,7 @@ def draw(
     displacement: np.ndarray | None = None,
     values: np.ndarray | None = None,
     scale: float | str = "auto",
-    up: str = "auto",
+    up: str | None = None,
     view: tuple[float, float] = VIEW,
     cmap: str = "viridis",
     limits: tuple[float, float] | None = None,
@@ -60,7 +61,7 @@ def draw(
 
     Returns the polygons, with the values as their array, so that ``figure.colorbar`` accepts them.
 
-    Raises ValueError if an array's shape or `up` does not fit.
+    Raises ValueError if an array's shape does not fit.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def draw(
         Factor of the displacement, or ``"auto"``: the largest is drawn as `DRAWN_AMPLITUDE` of the
         object's diagonal.
     up
-        Axis that points upwards, ``"x"``, ``"y"`` or ``"z"``; ``"auto"`` asks `guess_up`.
+        Axis that points upwards, see `UpAxis`; None asks `guess_up`.
     view
         Elevation and azimuth of the eye [degrees].
     cmap
@@ -92,7 +93,7 @@ def draw(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    turn = upright_rotation(up or guess_up(mesh))
     if displacement is not None:
         displacement = np.asarray(displacement, dtype=float).reshape(-1, 3)
         nodes = mesh.n_nodes
@@ -148,13 +149,13 @@ def mark(
     point: np.ndarray,
     colour: str,
     inward: np.ndarray | None = None,
-    up: str = "auto",
+    up: str | None = None,
 ) -> None:
     """Mark a point (3,) [m] of a drawn mesh: by an arrow that pushes `inward`, else by a ring."""
     from matplotlib.lines import Line2D
     from mpl_toolkits.mplot3d import proj3d
 
-    turn = _rotation(guess_up(mesh) if up == "auto" else up)
+    turn = upright_rotation(up or guess_up(mesh))
     tip = proj3d.proj_transform(*(turn @ point), ax.get_proj())[:2]
     if inward is None:
         line = Line2D([tip[0]], [tip[1]], color=colour, marker="o", fillstyle="none", zorder=10)
@@ -167,7 +168,7 @@ def mark(
     ax.annotate("", tip, end, annotation_clip=False, arrowprops=style, zorder=10)
 
 
-def view_of(mesh: HexMesh, outward: np.ndarray, up: str = "auto") -> tuple[float, float]:
+def view_of(mesh: HexMesh, outward: np.ndarray, up: str | None = None) -> tuple[float, float]:
     """Elevation and azimuth [degrees] from where the sides that look `outward` (d, 3) are seen."""
     azimuths = VIEW[1] + np.arange(0.0, 360.0, 15.0)
     seen = [looks_at(mesh, outward, (VIEW[0], azimuth), up).min() for azimuth in azimuths]
@@ -175,10 +176,10 @@ def view_of(mesh: HexMesh, outward: np.ndarray, up: str = "auto") -> tuple[float
 
 
 def looks_at(
-    mesh: HexMesh, outward: np.ndarray, view: tuple[float, float], up: str = "auto"
+    mesh: HexMesh, outward: np.ndarray, view: tuple[float, float], up: str | None = None
 ) -> np.ndarray:
     """Cosines (d,) between directions `outward` (d, 3) and the one that the eye is in."""
-    turned = outward @ _rotation(guess_up(mesh) if up == "auto" else up).T
+    turned = outward @ upright_rotation(up or guess_up(mesh)).T
     return np.asarray(turned @ _direction(*np.radians(view)))
 
 
@@ -197,18 +198,6 @@ def _firmness(mesh: HexMesh, axis: int) -> float:
     centre = np.delete(mesh.grid.mean(axis=0), axis)
     reach = np.minimum(foot.max(axis=0) - centre, centre - foot.min(axis=0)).min() + 0.5
     return float(reach / height.mean())
-
-
-def _rotation(up: str) -> np.ndarray:
-    """Rotation (3, 3) that turns the axis `up` into the z axis of the plot."""
-    rotations = {
-        "x": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
-        "y": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
-        "z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-    }
-    if up not in rotations:
-        raise ValueError(f"up is {up!r}, expected 'auto', 'x', 'y' or 'z'")
-    return np.array(rotations[up], dtype=float)
 
 
 def _drawn_motion(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
@@ -43,6 +44,26 @@ ALIKE = 0.7
 """Share of letters in common (difflib) from which a word is taken for a mistyped one."""
 
 Place = tuple[str | int, ...]
+
+_OPTION = re.compile(r"--([a-z][a-z-]*[a-z])(?: ([^\s(),;]+))?")
+
+
+def in_keys(sentence: str) -> str:
+    """A sentence about options of commands, with the keys of a file in their place.
+
+    A word that comes after an option, without a comma, is its value.
+
+    Examples
+    --------
+    >>> in_keys("keep the largest alone (--components largest), or make a wall (--wall)")
+    'keep the largest alone (components: largest), or make a wall (wall)'
+    """
+
+    def key(option: re.Match[str]) -> str:
+        name = option[1].replace("-", "_")
+        return name if option[2] is None else f"{name}: {option[2]}"
+
+    return _OPTION.sub(key, sentence)
 
 
 class ParameterError(UserError):

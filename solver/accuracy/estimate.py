@@ -70,7 +70,7 @@ def estimate_cell_errors(model: FiniteCellModel, values: Array, modes: Array) ->
     if np.median(seen) < LEAST_SEEN:
         raise UserError(
             f"cells of several materials, or that are held, have {1.0 - np.median(seen):.0%} of "
-            f"the strain energy, expected at most {1.0 - LEAST_SEEN:.0%}; raise --resolution"
+            f"the strain energy, expected at most {1.0 - LEAST_SEEN:.0%}; raise the resolution"
         )
     gain, within = gained(space, space.residual(own, chosen))
     gain = gain / np.maximum(seen, LEAST_SEEN)

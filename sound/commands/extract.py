@@ -104,7 +104,7 @@ def _line(clip: dict[str, Any]) -> str:
 
 
 def _lines(content: dict[str, Any]) -> list[str]:
-    from math import log, log10
+    from sound.levels import DECAY_NEPERS, decibels
 
     lines = [_line(clip) for clip in content["clips"]]
     names = content["names"]
@@ -116,9 +116,9 @@ def _lines(content: dict[str, Any]) -> list[str]:
     modes = zip(content["frequencies_hz"], content["dampings_per_second"], columns, strict=True)
     for hertz, damping, column in modes:
         parts = [
-            f"{value:12.3e} {20.0 * log10(value / top):6.1f} dB" if value > 0.0 else " " * 22
+            f"{value:12.3e} {decibels(value / top):6.1f} dB" if value > 0.0 else " " * 22
             for value, top in zip(column, loudest, strict=True)
         ]
-        fall = log(1000.0) / damping
+        fall = DECAY_NEPERS / damping
         lines.append("  ".join([f"{hertz:9.2f}", f"{damping:8.3f}", f"{fall:10.3f}", *parts]))
     return lines

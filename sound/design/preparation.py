@@ -121,7 +121,7 @@ def prepared_solid(
     # Not the struck surface, whose cuts round: the voxels shall be those of the solver.
     loaded = SolidSurface.read(solid.mesh, solid.unit, solid.wall_size, solid.up)
     mesh, cells = discretised(loaded, solid)
-    loaded.hints.say_size_and_filling()
+    loaded.hints.say_size_and_filling(for_file=True)
     finite = None if cells is None else cells.cells
     frame = SolidFrame(solid.mesh, loaded.triangles, loaded.name, solid.unit, up=solid.up)
     composed = compose(composition or CompositionEntry(), frame)

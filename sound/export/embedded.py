@@ -41,6 +41,8 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
         "embedding": EMBEDDING.format(nodes),
         "mesh": str(design.settings.get("mesh", "")),
     }
+    if design.up is not None:
+        attributes["up"] = design.up
 
     def more(target: h5py.File) -> None:
         _put_more(target, design)

@@ -16,7 +16,7 @@ from carillon.files.paths import cause, require_plain
 from sound.export.faust import faust_program
 from sound.export.formats import ExportSettings
 from sound.export.gltf import write_gltf
-from sound.export.levels import LevelOfSound, levels_csv, levels_json, with_gains
+from sound.export.level_table import LevelRow, levels_csv, levels_json, with_gains
 from sound.export.modal_model import ModalModel
 from sound.export.modal_table import impact_objects, write_modal_csv, write_modal_json
 from sound.export.sound_set import file_names, rendered_set, require_count
@@ -38,7 +38,7 @@ class WrittenFolder:
     """What was written: names of files in the folder, levels of the sounds, and what is missing."""
 
     files: list[str]
-    levels: list[LevelOfSound]
+    levels: list[LevelRow]
     missing: list[str] = field(default_factory=list)
 
 

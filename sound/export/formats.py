@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
-from carillon.parameters import OneOf, option, parameters
-from carillon.parameters.quantities import between
+from carillon.parameters import option, parameters
+from carillon.parameters.quantities import UpAxis, between
 
 if TYPE_CHECKING:
     from carillon.arrays import Array
@@ -31,9 +31,10 @@ class ExportSettings:
         0,
         "points to strike all over the surface, besides the targets'; of .dsp, .js, tables, /",
     )
-    up: Annotated[str, OneOf("x", "y", "z")] | None = option(
+    up: UpAxis | None = option(
         None,
-        "for glTF: axis of the mesh that points up (default: y of meshes in glTF, z of others)",
+        "for glTF: axis of the mesh file that points up (default: that of the design's project, or "
+        "y of meshes in glTF and z of others)",
     )
 
 

@@ -33,6 +33,7 @@ from sound.export.gltf_asset import (
     UNSIGNED_INT,
     VERTICES,
     Buffer,
+    node_rotation,
     write_asset,
 )
 from sound.export.gltf_material import acoustic_material
@@ -42,7 +43,6 @@ from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
 from sound.rendering.rendered_sound import ringing_seconds
 from sound.rendering.solid import SoundingSolid
-from sound.scenes.bodies import upright
 
 EXTENSION = "KHR_audio_rigid_bodies"
 PHYSICS = "KHR_physics_rigid_bodies"
@@ -54,14 +54,10 @@ PHYSICS_DRAFT = (
     "draft, repository eoineoineoin/glTF_Physics, "
     "extensions/2.0/Khronos/KHR_physics_rigid_bodies, commit ac5c413"
 )
-AXES = ("x", "y", "z")
-"""Axes of the mesh that may point up."""
-_TURNS = {"x": (0.0, 0.0, 0.5**0.5, 0.5**0.5), "z": (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)}
-"""Quaternions (x, y, z, w) that turn an axis to y."""
 SOUND_RATE = 48_000
 """Samples per second of the strikes' sounds."""
 UNITS = {
-    "positions": "m, axes of the original mesh",
+    "positions": "m, axes of the solid",
     "frequencies": "Hz",
     "decayRates": "1/s",
     "shapes": "kg^-1/2",
@@ -84,8 +80,8 @@ def write_gltf(
 ) -> None:
     """Write `.glb` if `binary`, else `.gltf` with the data embedded in it.
 
-    `up` is the axis of the mesh that points up, one of `AXES`; by default y of solids from glTF
-    files, and z of others.  Raises UserError if the file cannot be written.
+    `up` is the axis of the mesh file that points up, see `Design.remaining_turn`.  Raises UserError
+    if the file cannot be written.
     """
     write_asset(path, *gltf_document(design, up, name), binary)
 
@@ -105,6 +101,7 @@ def gltf_document(
     body: dict[str, Any] = {
         "name": name,
         "mesh": 0,
+        "rotation": node_rotation(design.remaining_turn(up)),
         "children": list(range(1, 1 + len(strikes))),
         "extensions": {
             EXTENSION: {"modalModel": 0, "gain": gain},
@@ -128,9 +125,6 @@ def gltf_document(
         drafts[gltf_audio.EXTENSION] = gltf_audio.DRAFT
         for number, node in enumerate(strikes):
             node["extensions"] = {gltf_audio.EXTENSION: {"emitters": [number]}}
-    up = up or ("z" if upright(str(design.settings.get("mesh", ""))) is None else "y")
-    if up in _TURNS:
-        body["rotation"] = _TURNS[up]
     document = {
         "asset": {"version": "2.0", "generator": f"Carillon {__version__}", "extras": drafts},
         "extensionsUsed": list(drafts),

@@ -8,6 +8,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from carillon.arrays import Array
+from carillon.fem.geometry.turning import upright_rotation
 from carillon.files.atomic import atomic_path
 
 FLOAT, UNSIGNED_INT = 5126, 5125
@@ -54,6 +56,25 @@ class Buffer:
             "bufferViews": self.views,
             "buffers": [{"byteLength": len(self.data)}],
         }
+
+
+def node_rotation(turn: Array | None = None) -> list[float]:
+    """Quaternion (x, y, z, w) of a node that turns axes whose z points up to glTF's, whose y does.
+
+    `turn` (3, 3) goes before it: the rotation of the node's coordinates to such axes, if any.
+
+    Examples
+    --------
+    >>> [round(each, 4) for each in node_rotation()]
+    [-0.7071, 0.0, 0.0, 0.7071]
+    >>> node_rotation(upright_rotation("y"))
+    [0.0, 0.0, 0.0, 1.0]
+    """
+    from scipy.spatial.transform import Rotation
+
+    z_to_y = upright_rotation("y").T
+    whole = z_to_y if turn is None else z_to_y @ turn
+    return (Rotation.from_matrix(whole).as_quat(canonical=True) + 0.0).tolist()
 
 
 def write_asset(path: str | Path, document: dict[str, Any], data: bytes, binary: bool) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from carillon.arrays import Array
-from sound.levels import faded
+from sound.levels import fade_of_ringing, faded
 
 PEAK_DECIBELS = -1.0
 """Peak of a sound [dB of full scale]: converters and codecs overshoot a little."""
@@ -11,8 +11,6 @@ TAIL_DECIBELS = -60.0
 """Level below the peak [dB] from which on the end of a sound is cut."""
 FADE_SECONDS = 0.02
 """Time in which an end at that level fades to silence."""
-LONG_FADE_SECONDS = 1.0
-"""The same of a sound that still rings at its end, a quarter of its length at most."""
 
 
 def mastered(sound: Array, rate: int) -> tuple[Array, float]:
@@ -32,7 +30,7 @@ def mastered(sound: Array, rate: int) -> tuple[Array, float]:
         return sound, 1.0
     last = int(np.flatnonzero(np.abs(sound) > largest * 10.0 ** (TAIL_DECIBELS / 20.0))[-1])
     rings = last + 1 > len(sound) - FADE_SECONDS * rate
-    seconds = min(LONG_FADE_SECONDS, len(sound) / rate / 4.0) if rings else FADE_SECONDS
+    seconds = fade_of_ringing(len(sound) / rate) if rings else FADE_SECONDS
     made = faded(sound[: last + 1], rate, max(seconds, 1.0 / rate))[0]
     # The fade may take the largest sample along where a sound is shorter.
     gain = 10.0 ** (PEAK_DECIBELS / 20.0) / float(np.abs(made).max())

@@ -20,13 +20,12 @@ from sound.export.gltf_asset import (
     UNSIGNED_INT,
     VERTICES,
     Buffer,
+    node_rotation,
     write_asset,
 )
 from sound.export.gltf_audio import DRAFT, EXTENSION, audio_of
 from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture, linear_light
 
-UPRIGHT = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
-"""Quaternion (x, y, z, w) that turns z to y."""
 ROUGHNESS = 0.5
 """Roughness of all surfaces in glTF's sense, from 0, a mirror, to 1."""
 GROUND_COLOUR = (0.8, 0.8, 0.8)
@@ -55,7 +54,7 @@ def scene_document(performance: Performance) -> tuple[dict[str, Any], bytes]:
     nodes = [*_object_nodes(picture), *_ground_nodes(picture), _camera_node(picture.camera)]
     root = {
         "name": "z points up",
-        "rotation": UPRIGHT,
+        "rotation": node_rotation(),
         "children": list(range(1, 1 + len(nodes))),
     }
     camera = picture.camera  # sees as far as to infinity

@@ -11,7 +11,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from sound.clips.wav import as_wav
-from sound.export.levels import LevelOfSound, decibels
+from sound.export.level_table import LevelRow, level_of
 from sound.export.mastering import mastered
 from sound.export.modal_model import StruckPoint
 from sound.export.sound_set_options import SoundSetOptions
@@ -42,7 +42,7 @@ class SetSound:
 
     content: bytes
     gain: float
-    level: LevelOfSound
+    level: LevelRow
 
 
 def require_count(points: int, options: SoundSetOptions) -> None:
@@ -64,7 +64,7 @@ def rendered_set(
     """The sounds of points, strengths (the softest first) and variations, one after the other.
 
     Each is mastered by itself, see `sound.export.mastering`.  `gain_db` of its level is 0 here,
-    since it needs all of them, see `sound.export.levels.with_gains`.  The points of variations
+    since it needs all of them, see `sound.export.level_table.with_gains`.  The points of variations
     depend on the seed and on the number of their own point alone.  Raises UserError if the sounds
     are too many.
     """
@@ -81,15 +81,15 @@ def rendered_set(
                 hit = Hit(0.0, position, strength * inward)
                 sound = render(solid, [hit], seconds, options.rate, contact, listening)
                 made, gain = mastered(sound, options.rate)
-                level = LevelOfSound(
+                level = LevelRow(
                     f"{file_names([name])[0]}_{label}_s{number}_v{variation}.wav",
                     point.name,
                     strength,
                     variation,
                     0.0,
-                    decibels(float(np.abs(made).max(initial=0.0))),
-                    decibels(float(np.sqrt(np.mean(made**2)))),
-                    decibels(float(np.abs(sound).max(initial=0.0))),
+                    level_of(float(np.abs(made).max(initial=0.0))),
+                    level_of(float(np.sqrt(np.mean(made**2)))),
+                    level_of(float(np.abs(sound).max(initial=0.0))),
                     len(made) / options.rate,
                     contact,
                     *position.tolist(),

@@ -7,13 +7,13 @@ import csv
 import io
 from collections.abc import Sequence
 
-from sound.export.levels import LevelOfSound
+from sound.export.level_table import LevelRow
 
 QUIETEST_DECIBELS = -96.0
 """Least volume [dB] that Wwise takes."""
 
 
-def wwise_import(levels: Sequence[LevelOfSound], folder: str) -> str:
+def wwise_import(levels: Sequence[LevelRow], folder: str) -> str:
     r"""The list: a random container for each point and strength, with a sound for each variation.
 
     `folder`: that of the WAV files, seen from the list.  Paths of objects begin where the importer
@@ -21,7 +21,7 @@ def wwise_import(levels: Sequence[LevelOfSound], folder: str) -> str:
 
     Examples
     --------
-    >>> level = LevelOfSound("pan_rim_s1_v2.wav", "rim", 0.5, 2, -3.0, *[0.0] * 8)
+    >>> level = LevelRow("pan_rim_s1_v2.wav", "rim", 0.5, 2, -3.0, *[0.0] * 8)
     >>> print(wwise_import([level], "sounds"), end="")
     Audio File	Object Path	Property[Volume]
     sounds\pan_rim_s1_v2.wav	<Random Container>pan_rim_s1\<Sound SFX>pan_rim_s1_v2	-3

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array, Integers
 from carillon.errors import UserError
+from carillon.fem.geometry.turning import remaining_turn
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.regions import RegionOf
+from carillon.parameters.quantities import UP_AXES
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.strikes import Strike
@@ -109,6 +111,11 @@ class Design:
         return float(self.settings.get("unit", 1.0))
 
     @property
+    def up(self) -> str | None:
+        """Axis of its mesh that was turned to z; None if its axes are those of the mesh."""
+        return self.settings.get("up")
+
+    @property
     def frequencies(self) -> Array:
         """Frequencies (N,) [Hz] of the elastic modes: of the fine solid, if they are known."""
         return self.coarse_frequencies if self.fine is None else self.fine.hertz
@@ -131,6 +138,14 @@ class Design:
         if self.damping is None or source == "clips":
             return self.targets.dampings
         return self.damping.dampings
+
+    def remaining_turn(self, up: str | None = None) -> Array | None:
+        """Rotation (3, 3) that it still needs for z to point up; None if it stands upright.
+
+        `up` is the axis of its mesh file that points up, by default as
+        `carillon.fem.geometry.turning.remaining_turn` says.
+        """
+        return remaining_turn(str(self.settings.get("mesh", "")), up, self.up)
 
     def young_near(self, positions: Array) -> Array:
         """Moduli (p,) [Pa] of the fine cells that are nearest to positions (p, 3) [m]."""
@@ -232,6 +247,7 @@ def fault(design: Design) -> str:
 _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "mesh": ("a text", lambda value: isinstance(value, str)),
     "unit": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
+    "up": (f"null or one of {', '.join(UP_AXES)}", lambda value: value in (None, *UP_AXES)),
     "material": ("keys and values", lambda value: isinstance(value, Mapping)),
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
 }

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from carillon.arrays import Surface
-from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.builtin_names import in_folder
 from carillon.composition.entries import CompositionEntry, RegionEntry, SupportEntry
 from carillon.fem.element import DEFAULT_POISSON
 from carillon.fem.model import DEFAULT_DENSITY
@@ -183,18 +183,10 @@ def with_optimiser(project: Project, **given: Any) -> Project:
 
 def _in_folder(project: Project, folder: Path) -> Project:
     """The project with its paths, which are relative to a folder, as the working directory has."""
-    is_file = not project.mesh.startswith(BUILTIN_PREFIX)
     return replace(
         project,
-        mesh=str(folder / project.mesh) if is_file else project.mesh,
-        regions=tuple(_region_in_folder(each, folder) for each in project.regions),
+        mesh=in_folder(project.mesh, folder),
+        regions=tuple(each.in_folder(folder) for each in project.regions),
         forest=None if project.forest is None else str(folder / project.forest),
         targets=tuple(replace(each, clip=str(folder / each.clip)) for each in project.targets),
     )
-
-
-def _region_in_folder(region: RegionEntry, folder: Path) -> RegionEntry:
-    def there(file: str | None) -> str | None:
-        return file if file is None or file.startswith(BUILTIN_PREFIX) else str(folder / file)
-
-    return replace(region, mesh=there(region.mesh), labels=there(region.labels))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from carillon.arrays import Array, Integers
 from carillon.composition.materials import NamedMaterial
 from carillon.errors import ConvergenceError, UserError
+from carillon.parameters.sentences import in_keys
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.convex import convex_parts, hull_of
@@ -25,14 +25,6 @@ from sound.scenes.shape import Shape
 
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""
-Y_UP = (".gltf", ".glb")
-"""Endings of mesh files whose y points up.  In all other files z is taken to point up."""
-_TO_Z = {
-    "x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
-    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-    "z": None,
-}
-"""Rotations to axes whose z points up, by the axis that points up (y: glTF 2.0, section 3.4)."""
 
 
 @dataclass(frozen=True)
@@ -184,18 +176,13 @@ def _naming(entry: ObjectEntry) -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        raise UserError(f"object {entry.name!r}: {_in_keys(str(error))}") from None
+        raise UserError(f"object {entry.name!r}: {in_keys(str(error))}") from None
     except ConvergenceError as error:
         raise ConvergenceError(f"object {entry.name!r}: {error}") from None
 
 
-def _in_keys(sentence: str) -> str:
-    """A sentence about an option of commands, with the key of a scene in its place."""
-    return sentence.replace("--components largest", "components: largest")
-
-
 def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
-    rigid, turn = solid.rigid, upright(solid.mesh, entry.up)
+    rigid, turn = solid.rigid, solid.turn
     inertia = (rigid.axes * rigid.moments) @ rigid.axes.T
     shape = Shape.of_surface(solid.vertices, solid.faces, rigid.centre, solid.radius)
     if turn is not None:
@@ -229,22 +216,3 @@ def _upright_body(entry: ObjectEntry, solid: ObjectSolid) -> Body:
         solid.radius,
         turn,
     )
-
-
-def upright(mesh: str, up: str = "auto") -> Array | None:
-    """Rotation (3, 3) from the coordinates of a mesh file to axes whose z points up, None if none.
-
-    The axis `up` of the file points up: x, y or z, or "auto", which is y of glTF and z of others.
-
-    Examples
-    --------
-    >>> upright("bar.GLB") @ [0.0, 1.0, 0.0]
-    array([0., 0., 1.])
-    >>> upright("bar.obj") is None, upright("bar.glb", "z") is None
-    (True, True)
-    >>> upright("bar.obj", "x") @ [1.0, 0.0, 0.0]
-    array([0., 0., 1.])
-    """
-    if up == "auto":
-        up = "y" if Path(mesh).suffix.lower() in Y_UP else "z"
-    return _TO_Z[up]

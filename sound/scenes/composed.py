@@ -36,7 +36,7 @@ _VERSION = 2  # counted up when other modes are found than before
 
 
 class ComposedObject:
-    """What an object of a scene is made of, and its solid, in metres and in the mesh's own axes.
+    """What an object of a scene is made of, and its solid, in metres and in axes whose z points up.
 
     Raises UserError for regions or supports that describe nothing.
     """
@@ -53,7 +53,7 @@ class ComposedObject:
             rest = Regions.one(own.poisson, own.density, own.young, damping, name)
         described = CompositionEntry(regions=entry.regions, supports=entry.supports)
         assert entry.mesh is not None
-        frame = SolidFrame(entry.mesh, surface, entry.name, entry.unit)
+        frame = SolidFrame(entry.mesh, surface, entry.name, entry.unit, up=given.up)
         placed = compose(described, frame, rest=rest)
         assert placed.composition is not None
         self.composition: Composition = placed.composition

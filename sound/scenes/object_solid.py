@@ -1,6 +1,6 @@
 """The solid of a scene's object: of a design, a modes file, a mesh or a ball."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Integers, Surface
 from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError
-from carillon.fem.geometry.size import doubt_unit
+from carillon.fem.geometry.hints import MeshHints
+from carillon.fem.geometry.turning import remaining_turn
 from carillon.fem.geometry.walls import Wall, WallSize
 from carillon.fem.model import RIGID_MODES, MassProperties, Solid, mass_properties
 from carillon.files.hdf5 import kind_of
@@ -53,7 +54,7 @@ class Sounding:
 
 @dataclass(frozen=True)
 class ObjectSolid:
-    """The solid of an object, in the coordinates of its file."""
+    """The solid of an object, in the coordinates of its file, or of its mesh turned upright."""
 
     rigid: MassProperties
     """Mass, centre of mass and inertia."""
@@ -72,8 +73,9 @@ class ObjectSolid:
     find: Callable[[], Sounding] | None
     """Finds the modes, which may take long; None if the object is silent. Raises ConvergenceError
     if they were not found."""
-    mesh: str = ""
-    """str: name of the mesh file whose axes the solid has, empty if there is none."""
+    turn: Array | None = None
+    """(3, 3) or None: rotation from these coordinates to axes whose z points up, see
+    `carillon.fem.geometry.turning.remaining_turn`."""
     radius: float | None = None
     """float [m] or None: radius of a ball, None for any other solid."""
     is_held: bool = False
@@ -95,11 +97,22 @@ def object_solid(entry: ObjectEntry) -> ObjectSolid:
         return _of_ball(entry, entry.radius)
     mesh = entry.mesh
     assert mesh is not None
-    if entry.size is not None:
-        entry = _in_metres(entry, mesh, entry.size)
-    if entry.regions or entry.supports:
-        return _of_parts(entry, mesh)
-    return _of_mesh(entry, mesh)
+    in_metres = entry if entry.size is None else _in_metres(entry, mesh, entry.size)
+    made = (_of_parts if entry.regions or entry.supports else _of_mesh)(in_metres, mesh)
+    _say_hints(entry, mesh, made)
+    return made
+
+
+def _say_hints(entry: ObjectEntry, mesh: str, solid: ObjectSolid) -> None:
+    """Log what may be otherwise than the mesh was opened; its unit, where that tells its size."""
+    import trimesh
+
+    surface = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
+    is_wall = entry.wall is not None
+    hints = MeshHints.of(mesh, surface, entry.unit, entry.mesh_up, is_wall)
+    if entry.size is not None or entry.pitch is not None:
+        hints = replace(hints, units={})
+    hints.say(for_file=True)
 
 
 def _in_metres(entry: ObjectEntry, mesh: str, size: float) -> ObjectEntry:
@@ -125,7 +138,7 @@ def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
         touched.which,
         _volume(design.model),
         lambda: Sounding(sounding, Listening.of_design(design, sounding)),
-        _file_axes(design.settings),
+        design.remaining_turn(entry.up),
         is_held=design.model.rigid_modes < RIGID_MODES,
     )
 
@@ -154,7 +167,7 @@ def _of_modes(entry: ObjectEntry, path: str, heard_path: str | None) -> ObjectSo
         touched.which,
         _volume(file.model),
         lambda: Sounding(sounding, accuracy=accuracy or None),
-        _file_axes(file.attributes),
+        remaining_turn(file.attributes.get("mesh", ""), entry.up, file.up),
         is_held=file.model.rigid_modes < RIGID_MODES,
     )
 
@@ -175,11 +188,6 @@ def _heard(entry: ObjectEntry, file: ModesFile) -> SoundingSolid:
 
 def _volume(model: Solid) -> float:
     return float(model.mass / model.density)
-
-
-def _file_axes(described: Mapping[str, Any]) -> str:
-    """Name of the mesh file whose axes a design or a modes file has; empty if they were turned."""
-    return "" if described.get("up") else described.get("mesh", "")
 
 
 def _of_kind(path: str, expected: str) -> str:
@@ -214,13 +222,45 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     volume = 4.0 / 3.0 * np.pi * radius**3
     mass = volume * entry.made_of.density
     moments = np.full(3, 0.4 * mass * radius**2)
+    rigid = MassProperties(mass, np.zeros(3), moments, np.eye(3))
+    return _of_one_material(entry, rigid, sphere, volume, find, radius)
+
+
+def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
+    from sound.strikes import longest_side, struck_surface
+
+    wall = entry.wall_size
+    surface = struck_surface(mesh, entry.unit, wall=wall, up=entry.mesh_up)
+    # In the mesh's own unit, so that objects which differ by unit alone share their modes.
+    longest = longest_side(surface) / entry.unit
+    unit = 1.0 if EXTENTS[0] <= longest <= EXTENTS[1] else entry.unit
+    size = entry.unit / unit
+    if wall is not None:
+        wall = WallSize(wall.thickness / size, wall.side)
+    solid = _Scaled(SolidSurface.read(mesh, unit, wall, entry.mesh_up).solid, entry, size)
+    rigid = solid.rigid
+    surface.apply_scale(solid.factor)
+    volume = rigid.mass / entry.made_of.density
+    return _of_one_material(entry, rigid, surface, volume, solid.sounding if entry.count else None)
+
+
+def _of_one_material(
+    entry: ObjectEntry,
+    rigid: MassProperties,
+    surface: Surface,
+    volume: float,
+    find: Callable[[], Sounding] | None,
+    radius: float | None = None,
+) -> ObjectSolid:
+    """The solid inside a surface, of the object's own material."""
+    material = entry.made_of
     return ObjectSolid(
-        MassProperties(mass, np.zeros(3), moments, np.eye(3)),
-        np.asarray(sphere.vertices),
-        np.asarray(sphere.faces),
-        np.full(len(sphere.vertices), entry.made_of.young),
-        entry.made_of.poisson,
-        (entry.made_of,),
+        rigid,
+        np.asarray(surface.vertices),
+        np.asarray(surface.faces),
+        np.full(len(surface.vertices), material.young),
+        material.poisson,
+        (material,),
         None,
         volume,
         find,
@@ -228,47 +268,18 @@ def _of_ball(entry: ObjectEntry, radius: float) -> ObjectSolid:
     )
 
 
-def _of_mesh(entry: ObjectEntry, mesh: str) -> ObjectSolid:
-    from sound.strikes import longest_side, struck_surface
-
-    wall = entry.wall_size
-    surface = struck_surface(mesh, entry.unit, wall=wall)
-    # In the mesh's own unit, so that objects which differ by unit alone share their modes.
-    longest = longest_side(surface) / entry.unit
-    unit = 1.0 if EXTENTS[0] <= longest <= EXTENTS[1] else entry.unit
-    size = entry.unit / unit
-    if wall is not None:
-        wall = WallSize(wall.thickness / size, wall.side)
-    solid = _Scaled(SolidSurface.read(mesh, unit, wall).solid, entry, size)
-    rigid = solid.rigid
-    doubt_unit(mesh, surface.extents, entry.unit)
-    surface.apply_scale(solid.factor)
-    return ObjectSolid(
-        rigid,
-        np.asarray(surface.vertices),
-        np.asarray(surface.faces),
-        np.full(len(surface.vertices), entry.made_of.young),
-        entry.made_of.poisson,
-        (entry.made_of,),
-        None,
-        rigid.mass / entry.made_of.density,
-        solid.sounding if entry.count else None,
-        mesh,
-    )
-
-
 def _of_parts(entry: ObjectEntry, mesh: str) -> ObjectSolid:
     """The solid of a mesh of several regions, or that something holds."""
     from sound.strikes import struck_surface
 
-    given = SolidSurface.read(mesh, entry.unit, entry.wall_size)
+    up = entry.mesh_up
+    given = SolidSurface.read(mesh, entry.unit, entry.wall_size, up)
     composed = ComposedObject(entry, given)
-    surface = struck_surface(mesh, entry.unit, composed.parts_of, entry.wall_size)
+    surface = struck_surface(mesh, entry.unit, composed.parts_of, entry.wall_size, up)
     vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
     which = composed.parts_of(vertices, faces)
     unsolved = composed.unsolved(_how(entry))
     rigid, model = unsolved.rigid, unsolved.model
-    doubt_unit(mesh, surface.extents, entry.unit)
     find, factor = partial(_found, partial(composed.solved, unsolved)), 1.0
     if entry.pitch is not None:
         solved = composed.solved(unsolved)
@@ -287,7 +298,6 @@ def _of_parts(entry: ObjectEntry, mesh: str) -> ObjectSolid:
         which,
         factor**3 * _volume(model),
         find if entry.count else None,
-        mesh,
         is_held=model.rigid_modes < RIGID_MODES,
     )
 

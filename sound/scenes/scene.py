@@ -6,10 +6,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from carillon.builtin_names import BUILTIN_PREFIX
+from carillon.builtin_names import BUILTIN_PREFIX, in_folder
 from carillon.composition.entries import RegionEntry, SupportEntry
 from carillon.composition.materials import NamedMaterial, named_material
 from carillon.errors import UserError
+from carillon.fem.geometry.turning import up_of_format
 from carillon.fem.geometry.walls import WallSize
 from carillon.limits import EXTENTS
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
@@ -24,6 +25,7 @@ from carillon.parameters.quantities import (
     Resolution,
     ShownName,
     Triple,
+    UpAxis,
     WallSide,
     WallThickness,
     between,
@@ -34,8 +36,6 @@ SOURCES = ("design", "modes", "mesh", "radius")
 """What an object may be, one of them."""
 FILES = ("design", "modes", "mesh", "heard_modes")
 """Keys of an object that name files."""
-REGION_FILES = ("mesh", "labels")
-"""Keys of a region that name files."""
 GROUND_NAME = "ground"
 """What lists and scenes call the floor."""
 STANDARD_MATERIAL = "plastic"
@@ -109,24 +109,25 @@ class ObjectEntry:
     )
     regions: Annotated[tuple[RegionEntry, ...], Within(max_length=1000)] = option(
         (),
-        "parts of a mesh that are of other materials, in the mesh's own axes: of several in one "
+        "parts of a mesh that are of other materials, in axes whose z points up: of several in one "
         "place the last one counts, and where there is none the object's own material; of a design "
         "or of modes, names of regions that these have, with the material of each, for friction, "
         "bounce, roughness and colour",
     )
     supports: Annotated[tuple[SupportEntry, ...], Within(max_length=1000)] = option(
         (),
-        "what holds a fixed mesh, or masses that are fixed to it, in the mesh's own axes; those of "
-        "modes and designs are in their files",
+        "what holds a fixed mesh, or masses that are fixed to it, in axes whose z points up; those "
+        "of modes and designs are in their files",
     )
     unit: MetresPerUnit = option(1.0)
     size: Annotated[float, between(*EXTENTS)] | None = option(
         None, "longest side of a mesh [m], to which it is scaled, in place of a unit"
     )
-    up: Annotated[str, OneOf("auto", "x", "y", "z")] = option(
-        "auto",
+    up: UpAxis | None = option(
+        None,
         "axis of the mesh file that points up, which is turned to the z of the scene, also of a "
-        "design or of modes that were made of one; auto is y of glTF and z of all others",
+        "design or of modes that were made of one; regions and supports are then in the turned "
+        "axes; null is what the design or modes were made with, or y of glTF and z of all others",
     )
     pitch: Annotated[float, between(20.0, 20_000.0)] | None = option(
         None, "frequency of its first mode, to which a mesh is scaled [Hz]; null leaves its size"
@@ -260,6 +261,11 @@ class ObjectEntry:
                 "pitch scales a mesh, which springs, pads and masses do not follow; leave out "
                 "pitch, or hold it without them"
             )
+
+    @property
+    def mesh_up(self) -> str | None:
+        """Axis of its mesh file that points up; None if neither the scene nor the format says."""
+        return self.up or up_of_format(self.mesh or "")
 
     @property
     def wall_size(self) -> WallSize | None:
@@ -419,13 +425,9 @@ class Scene:
     def files(self) -> list[str]:
         """Files that it is made from."""
         named = [getattr(each, key) for each in self.objects for key in FILES]
-        named += [
-            getattr(region, key)
-            for each in self.objects
-            for region in each.regions
-            for key in REGION_FILES
-        ]
-        return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
+        files = [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
+        regions = [region for each in self.objects for region in each.regions]
+        return files + [name for region in regions for name in region.files]
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -449,21 +451,7 @@ def _in_folder(scene: Scene, folder: Path) -> Scene:
     objects = []
     for each in scene.objects:
         named = {key: getattr(each, key) for key in FILES}
-        files: Any = {
-            key: str(folder / name)
-            for key, name in named.items()
-            if name is not None and not name.startswith(BUILTIN_PREFIX)
-        }
-        regions = tuple(_region_in_folder(region, folder) for region in each.regions)
+        files: Any = {key: in_folder(name, folder) for key, name in named.items() if name}
+        regions = tuple(region.in_folder(folder) for region in each.regions)
         objects.append(replace(each, **files, regions=regions))
     return replace(scene, objects=tuple(objects))
-
-
-def _region_in_folder(region: RegionEntry, folder: Path) -> RegionEntry:
-    named = {key: getattr(region, key) for key in REGION_FILES}
-    files: Any = {
-        key: str(folder / name)
-        for key, name in named.items()
-        if name is not None and not name.startswith(BUILTIN_PREFIX)
-    }
-    return replace(region, **files)

@@ -13,6 +13,7 @@ from carillon.command_line.logs import warn_once
 from carillon.fem.geometry.facets import Facets
 from carillon.fem.geometry.size import lengths_in_words, likely_units, unit_hint
 from carillon.fem.geometry.turning import likely_up
+from carillon.parameters.sentences import in_keys
 
 SHELL = 0.01
 """Thickness of the shell that is proposed, over the longest side of its surface."""
@@ -69,29 +70,34 @@ class MeshHints:
             shell_thickness(max(x, y, z)) if is_filled else None,
         )
 
-    def say_size_and_filling(self) -> None:
-        """Log what bears on the modes, each hint once: a doubtful unit, and an open surface."""
+    def say_size_and_filling(self, for_file: bool = False) -> None:
+        """Log what bears on the modes, each hint once: a doubtful unit, and an open surface.
+
+        What mends it is an option of commands, or `for_file` a key of a project or scene.
+        """
         if self.units and (hint := unit_hint(self.extents, self.unit)):
-            self._say(hint)
+            self._say(hint, for_file)
         if self.shell is not None:
             thickness = lengths_in_words([self.shell]).replace(" ", "")
             self._say(
                 "its surface is open; what it surrounds is filled and makes a full solid. For a "
                 f"shell, give --wall {thickness}, which takes finite cells "
-                "(--discretisation finite-cell)"
+                "(--discretisation finite-cell)",
+                for_file,
             )
 
-    def say(self) -> None:
-        """Log all hints, each once."""
-        self.say_size_and_filling()
+    def say(self, for_file: bool = False) -> None:
+        """Log all hints, each once, see `say_size_and_filling`."""
+        self.say_size_and_filling(for_file)
         if self.up is not None:
             self._say(
                 f"seems to stand on {self.up} = 0 and to lie on its side, since z points up here; "
-                f"to stand it up, give --up {self.up}"
+                f"--up {self.up} stands it up",
+                for_file,
             )
 
-    def _say(self, hint: str) -> None:
-        warn_once(f"{self.mesh}: {hint}")
+    def _say(self, hint: str, for_file: bool) -> None:
+        warn_once(f"{self.mesh}: {in_keys(hint) if for_file else hint}")
 
 
 def is_open(surface: Surface) -> bool:

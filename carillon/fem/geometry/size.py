@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.command_line.logs import warn_once
 from carillon.parameters.quantities import LENGTHS
 
 LARGE = 3.0
@@ -63,15 +61,6 @@ def length_in_words(length: float) -> str:
 
 def _unit_of(length: float) -> str:
     return next((name for name, least in _SHOWN if length >= least), "m")
-
-
-def doubt_unit(mesh: str, extents: Sequence[float], unit: float) -> None:
-    """Log what `unit_hint` says of a mesh file, once; built-in objects are in metres.
-
-    For those who have made a solid of it: what is refused is told alone.
-    """
-    if not mesh.startswith(BUILTIN_PREFIX) and (hint := unit_hint(extents, unit)):
-        warn_once(f"{mesh}: {hint}")
 
 
 def unit_hint(extents: Sequence[float], unit: float) -> str | None:

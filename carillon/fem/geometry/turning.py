@@ -63,6 +63,31 @@ def turned_back(points: Array, up: str | None) -> Array:
     return points if up is None else points @ upright_rotation(up) + 0.0
 
 
+def remaining_turn(
+    mesh: str = "", up: str | None = None, turned: str | None = None
+) -> Array | None:
+    """Rotation (3, 3) that a solid still needs for z to point up; None if it stands upright.
+
+    `mesh` is the file that the solid was made of, `up` the axis of that file that points up, and
+    `turned` the axis of it that was turned to z when the solid was made, if one was. Without `up`,
+    `turned` counts, then what the format of the file says, then z.
+
+    Examples
+    --------
+    >>> remaining_turn("bar.glb") @ [0.0, 1.0, 0.0]
+    array([0., 0., 1.])
+    >>> remaining_turn("bar.obj") is None, remaining_turn("bar.glb", turned="y") is None
+    (True, True)
+    >>> remaining_turn("bar.obj", "x", "x") is None
+    True
+    """
+    up = up or turned or up_of_format(mesh) or "z"
+    before = "z" if turned is None else turned
+    if up == before:
+        return None
+    return upright_rotation(up) @ upright_rotation(before).T + 0.0
+
+
 def turned_upright(surface: Surface, up: str | None) -> Surface:
     """A surface whose vertices are turned by `upright_rotation`; its faces stay as they are.
 

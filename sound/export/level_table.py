@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from carillon import __version__
 from sound.export.mastering import PEAK_DECIBELS
+from sound.levels import decibels
 
 COLUMNS = {
     "file": "name of the WAV file",
@@ -30,10 +29,12 @@ COLUMNS = {
     "z_m": "",
 }
 """Columns of the table of levels, and what they mean."""
+SILENCE_DECIBELS = -240.0
+"""Level of silence in the table [dB], since JSON has no infinity."""
 
 
 @dataclass(frozen=True)
-class LevelOfSound:
+class LevelRow:
     """A row of the table of levels, see `COLUMNS`."""
 
     file: str
@@ -51,19 +52,19 @@ class LevelOfSound:
     z_m: float
 
 
-def with_gains(sounds: Sequence[tuple[float, LevelOfSound]]) -> list[LevelOfSound]:
+def with_gains(sounds: Sequence[tuple[float, LevelRow]]) -> list[LevelRow]:
     """Rows with the gains [dB] that make files as loud to each other as the strikes were.
 
     `sounds`: what each sound was multiplied by, and its row.  The greatest gain is 0 dB.
     """
     least = min(gain for gain, _ in sounds)
     return [
-        LevelOfSound(**{**asdict(level), "gain_db": decibels(least / gain) + 0.0})
+        LevelRow(**{**asdict(level), "gain_db": decibels(least / gain) + 0.0})
         for gain, level in sounds
     ]
 
 
-def levels_csv(levels: Sequence[LevelOfSound]) -> str:
+def levels_csv(levels: Sequence[LevelRow]) -> str:
     """The table of levels as CSV."""
     content = io.StringIO()
     table = csv.writer(content, lineterminator="\n")
@@ -74,7 +75,7 @@ def levels_csv(levels: Sequence[LevelOfSound]) -> str:
     return content.getvalue()
 
 
-def levels_json(name: str, levels: Sequence[LevelOfSound], rate: int, seed: int) -> str:
+def levels_json(name: str, levels: Sequence[LevelRow], rate: int, seed: int) -> str:
     """The table of levels as JSON, with the sampling rate [Hz] and the seed of the variations."""
     content: dict[str, Any] = {
         "format": "carillon sound set 1",
@@ -90,12 +91,12 @@ def levels_json(name: str, levels: Sequence[LevelOfSound], rate: int, seed: int)
     return json.dumps(content, indent=1)
 
 
-def decibels(ratio: float) -> float:
-    """A ratio of amplitudes in dB; that of 0 is -240 dB.
+def level_of(ratio: float) -> float:
+    """Level [dB] of a ratio of amplitudes as the table has it, `SILENCE_DECIBELS` or more.
 
     Examples
     --------
-    >>> decibels(0.1), decibels(0.0)
+    >>> level_of(0.1), level_of(0.0)
     (-20.0, -240.0)
     """
-    return 20.0 * float(np.log10(max(ratio, 1e-12)))
+    return max(decibels(ratio), SILENCE_DECIBELS)
