@@ -218,7 +218,10 @@ def _pair(name: str, config: Mapping[str, Any]) -> Example:
         elsewhere=(elsewhere["name"], tuple(elsewhere["at"])),
         compared=False,
         by_default=True,
-        search={"evaluations": sound["clip_evaluations"], "seed": sound["seed"] + int(seed or 0)},
+        search={
+            "evaluations": sound["clip_evaluations"],
+            "seed": sound["seed"] + int(seed or 0) or None,
+        },
     )
 
 

@@ -56,7 +56,7 @@ class OfClips(Examples):
 
     listed = OF_CLIPS
     prefix = f"{OF_CLIPS}-"
-    title = "Sounds by default"
+    title = "Sounds with all defaults"
     about = (
         "A recording, a solid of another kind, and nothing else said: does the design sound like "
         "the recording, and does it say so where it does not?"

@@ -1,6 +1,6 @@
 """Tables of the pairs of a recording and a solid that are designed with all defaults."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from statistics import median, median_low
 from typing import Any
 
@@ -102,11 +102,7 @@ def _row(results: SoundResults) -> Row:
         **verdict,
         **verdict["likeness"][0],
     }
-    if "word" not in row:
-        return row
-    missed = _missed(row, row["silence_db"] - NEARER_DECIBELS)
-    goals = f"missed: {missed}" if missed else "met"
-    return row | {"goals": "told" if row["word"] == CANNOT else goals}
+    return row | _goals(row, row.get("silence_db", 0.0) - NEARER_DECIBELS)
 
 
 def _medians(rows: list[Row]) -> Row:
@@ -118,18 +114,20 @@ def _medians(rows: list[Row]) -> Row:
             values[key] = (median_low if counts else median)(there)
     words = [row["word"] for row in rows if "word" in row]
     counted = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
-    row = {"pair": "median", "title": "Median", "word": counted, **values}
-    if not words:
-        return row
-    missed = _missed(row, LIKE_DECIBELS)
-    return row | {"goals": f"missed: {missed}" if missed else "met"}
+    row = {"pair": "median", "title": "Median", "word": counted, "reason": "", **values}
+    return row | _goals(row, LIKE_DECIBELS)
 
 
-def _missed(row: Mapping[str, Any], most_decibels: float) -> str:
-    ratio = max(row["decay_ratio"], 1.0 / max(row["decay_ratio"], 1e-9))
+def _goals(row: Row, most_decibels: float) -> Row:
+    """Which goals a row misses; nothing without a verdict."""
+    if not row.get("word"):
+        return {}
+    if row["word"] == CANNOT:
+        return {"goals": "says it cannot"}
     missed = {
         "error": row["median_cents"] > LIKE_CENTS,
         "distance": row["distance_db"] > most_decibels,
-        "decay": ratio > LIKE_RATIO,
+        "decay": not 1.0 / LIKE_RATIO <= row["decay_ratio"] <= LIKE_RATIO,
     }
-    return ", ".join(name for name in missed if missed[name])
+    names = ", ".join(name for name in missed if missed[name])
+    return {"goals": f"missed: {names}" if names else "met"}
