@@ -121,6 +121,6 @@ def comparison(wildcards):
 
 
 def reached(wildcards):
-    """Which modes the solid can have; pairs are not asked, since most cannot have some."""
+    """Which modes the solid can have; of a pair it is not asked, as that may take minutes."""
     is_pair = EXAMPLES[wildcards.example].by_default
     return [] if is_pair else [f"{SOUND}/{wildcards.example}/{REACHED}"]

@@ -62,7 +62,7 @@ class OfClips(Examples):
         "the recording, and does it say so where it does not?"
     )
 
-    @property
+    @cached_property
     def seeded(self) -> list[SoundResults]:
         """Results of the pair that is designed by several seeds."""
         return self._named(seeded(self.config))
