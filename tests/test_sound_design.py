@@ -329,12 +329,14 @@ def folder(tmp_path):
 
 
 def test_command_from_clips_to_file_and_on(folder):
-    first = run_design(folder, "--json")
+    first = run_design(folder, "--json", "--seed", "5")
     out, errors = first.communicate()
     assert first.returncode == 0, errors
     summary = json.loads(out)
     assert summary["cost"] < 0.7 * summary["cost_start"] and summary["workers"] == 1
-    before = read_design(folder / "design.h5").history["evaluations"][-1]
+    design = read_design(folder / "design.h5")
+    assert design.settings["optimiser"]["seed"] == 5
+    before = design.history["evaluations"][-1]
     second = run_design(folder, "--evaluations", "8")
     out, errors = second.communicate()
     assert second.returncode == 0, errors

@@ -1,7 +1,7 @@
 """Options that several commands have in common."""
 
 from carillon.parameters import option, parameters
-from carillon.parameters.quantities import Count, Positive, Workers
+from carillon.parameters.quantities import Count, Positive, Seed, Workers
 from sound.project.settings import Dampings, OptimiserMethod
 
 
@@ -13,6 +13,7 @@ class SearchOptions:
     evaluations: Count | None = option(
         None, "modal analyses of a search at most, not the project's"
     )
+    seed: Seed | None = option(None, "seed of the search, not the project's")
     method: OptimiserMethod | None = option(None, "not the project's")
     workers: Workers | None = option(None, "processes, not the project's")
 

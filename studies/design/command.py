@@ -38,7 +38,7 @@ class DesignBenchmarkOptions:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
     add_options(parser, DesignBenchmarkOptions, positional=("project",))
-    add_options(parser, SearchOptions, leave_out=("method",))
+    add_options(parser, SearchOptions, leave_out=("method", "seed"))
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,6 +16,15 @@ EXAMPLES = (
 """Examples without clips of real strikes."""
 RECORDED = ("wood-block", "standing-bell", "tabla", "glass")
 """Examples with such clips."""
+PAIRS = (
+    *("wood-block-hard-on-bar", "wood-block-hard-on-bowl"),
+    *("clave-hard-on-bar", "clave-hard-on-frying-pan"),
+    *("small-bell-on-bowl", "small-bell-on-bar"),
+    *("cowbell-on-frying-pan", "cowbell-on-bowl"),
+    *("glass-high-on-bowl", "glass-high-on-frying-pan"),
+    *("agogo-high-on-frying-pan", "agogo-high-on-bar"),
+)
+"""Pairs of a recording and a built-in solid."""
 
 
 @parameters
@@ -33,6 +42,20 @@ class SoundSection:
         "names of the examples whose clips are real recordings; target sounds_of_recordings "
         "computes them",
     )
+    clips: Several[Annotated[str, OneOf(*PAIRS)]] = option(
+        PAIRS,
+        "pairs of a recording and a solid that are designed with all defaults, RECORDING-on-SOLID; "
+        "target sounds_of_clips computes them",
+    )
+    clip_evaluations: Annotated[int, Ge(1), Le(1_000_000_000)] | None = option(
+        None,
+        "modal analyses of the search for the material of a pair, in place of the default "
+        "processor time of a design, which holds if null [1]",
+    )
+    seeded_clip: Annotated[str, OneOf(*PAIRS)] = option(
+        "glass-high-on-bowl", "the pair that is designed by several seeds"
+    )
+    clip_seeds: Runs = option(5, "seeds of that pair [1]")
     bunny: File = option(
         "stanford-bunny.obj",
         "mesh file of the Stanford bunny below mesh_folder, for the chord; a built-in bell takes "
@@ -72,6 +95,7 @@ LIMITS = {
     "check_design": JobLimits(
         "modes of the fine model of a sound, or of a recorded solid", 8000, 60
     ),
+    "init_project": JobLimits("a project with all defaults", 1000, 10),
     "begin_design": JobLimits("where a search for a material starts", 8000, 30),
     "design_sound": JobLimits("a search for a material", 8000, 60),
     "compare_optimisers": JobLimits("optimisers beside each other", 8000, 60),

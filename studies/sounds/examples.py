@@ -16,6 +16,8 @@ from workflow.arguments import options
 from workflow.settings import located
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")
+BY_DEFAULT = Path(__file__).with_name("pairs.yaml")
+"""What pairs of a recording and a solid have in common."""
 FOLDER = "sound"
 """Folder of the examples beside the run's configuration."""
 PROJECT, DESIGN, START, TRUTH = "project.yaml", "design.h5", "start.h5", "truth.h5"
@@ -28,6 +30,10 @@ ELSEWHERE = "elsewhere"
 """Name of the sound at a point without a target."""
 WITHOUT_RECORDINGS, OF_RECORDINGS = LISTS = ("examples", "recordings")
 """Lists of examples in the configuration: without clips of real strikes, and with such clips."""
+OF_CLIPS = "clips"
+"""List of the pairs that are designed with all defaults."""
+ON, SEED = "-on-", "-seed-"
+"""In the name of a pair between its recording and its solid, and before a seed."""
 BUNNY = "bunny"
 RIGID_MODES = 6
 
@@ -37,11 +43,11 @@ class ExampleTarget:
     """A place, the arguments of `sound clip` for its clip, and the edit that it joins in.
 
     A `recording` of the list of real ones takes the place of the arguments; the clips of a recorded
-    solid have neither.
+    solid have neither. `carillon init` chooses the place if there is none.
     """
 
     name: str
-    at: tuple[float, float, float]
+    at: tuple[float, ...] = ()
     clip: str = ""
     edit: int = 1
     recording: str = ""
@@ -91,6 +97,10 @@ class Example:
     """What its clips are strikes of; None if they are synthesised."""
     weights: Mapping[str, float] = field(default_factory=dict)
     """Of the cost, those that are not as usual."""
+    by_default: bool = False
+    """Whether `carillon init` writes its project."""
+    search: Mapping[str, int | None] = field(default_factory=dict)
+    """Options of `sound design` that its search has."""
 
     @property
     def edits(self) -> int:
@@ -122,8 +132,16 @@ class Example:
 
 
 def examples(config: Mapping[str, Any]) -> dict[str, Example]:
-    """The examples that the lists of a configuration ask for, by name."""
-    return {name: _example(name, config) for key in LISTS for name in config["sound"][key]}
+    """The examples and pairs that the lists of a configuration ask for, by name."""
+    described = {name: _example(name, config) for key in LISTS for name in config["sound"][key]}
+    pairs = dict.fromkeys([*config["sound"][OF_CLIPS], *seeded(config)])
+    return described | {name: _pair(name, config) for name in pairs}
+
+
+def seeded(config: Mapping[str, Any]) -> list[str]:
+    """Names of the pair that is designed by several seeds, by seed; the first has none."""
+    name, seeds = config["sound"]["seeded_clip"], config["sound"]["clip_seeds"]
+    return [name, *(f"{name}{SEED}{seed}" for seed in range(1, seeds))]
 
 
 def project(example: Example, part: str, config: Mapping[str, Any]) -> dict[str, Any]:
@@ -160,7 +178,7 @@ def solid_arguments(example: Example) -> list[str]:
 
 
 def _example(name: str, config: Mapping[str, Any]) -> Example:
-    described, sound = _described()[name], config["sound"]
+    described, sound = _described(EXAMPLES)[name], config["sound"]
     meshes = [_mesh(solid["mesh"], config) for solid in described["solids"]]
     there = (mesh.startswith(BUILTIN_PREFIX) or Path(mesh).is_file() for mesh in meshes)
     chosen = list(there).index(True)
@@ -185,10 +203,32 @@ def _example(name: str, config: Mapping[str, Any]) -> Example:
     )
 
 
+def _pair(name: str, config: Mapping[str, Any]) -> Example:
+    pair, _, seed = name.partition(SEED)
+    recording, _, solid = pair.partition(ON)
+    described = dict(_described(BY_DEFAULT))
+    elsewhere = described.pop("elsewhere")[solid]
+    sound = config["sound"]
+    return Example(
+        name=name,
+        title=f"{recording} on {solid}".replace("-", " ").capitalize(),
+        **described,
+        mesh=f"{BUILTIN_PREFIX}{solid}",
+        targets=(ExampleTarget(recording, recording=recording),),
+        elsewhere=(elsewhere["name"], tuple(elsewhere["at"])),
+        compared=False,
+        by_default=True,
+        search={
+            "evaluations": sound["clip_evaluations"],
+            "seed": sound["seed"] + int(seed or 0) or None,
+        },
+    )
+
+
 def _mesh(mesh: str, config: Mapping[str, Any]) -> str:
     return located(config, config["sound"]["bunny"] if mesh == BUNNY else mesh)
 
 
 @cache
-def _described() -> dict[str, Any]:
-    return read_own_yaml(EXAMPLES)
+def _described(file: Path) -> dict[str, Any]:
+    return read_own_yaml(file)

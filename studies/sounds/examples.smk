@@ -10,7 +10,9 @@ SOUND = f"{RESULTS}/{SOUND_FOLDER}"
 EXAMPLES = sound_examples.examples(config)
 
 RECORDED = [name for name in EXAMPLES if EXAMPLES[name].recorded]
-OF_RECORDINGS = config["sound"][sound_examples.OF_RECORDINGS]
+DESCRIBED = [name for name in EXAMPLES if not EXAMPLES[name].by_default]
+BY_DEFAULT = [name for name in EXAMPLES if EXAMPLES[name].by_default]
+OF_RECORDINGS = [*config["sound"][sound_examples.OF_RECORDINGS], *BY_DEFAULT]
 WITHOUT_RECORDINGS = config["sound"][sound_examples.WITHOUT_RECORDINGS]
 SYNTHESISED = [name for name in WITHOUT_RECORDINGS if not EXAMPLES[name].recorded]
 
@@ -82,6 +84,11 @@ def sound_arguments(wildcards, output):
     return options({**place, "modes_out": output.modes})
 
 
+def search_options(wildcards, input):
+    """Options of a search for a material, and the design that it goes on from."""
+    return options({"initial_design": str(input.before), **example_of(wildcards).search})
+
+
 def all_sounds(wildcards):
     """All sounds of an example's page, and their modes alone, which the clips have not."""
     names = list(targets_of(wildcards))
@@ -111,3 +118,9 @@ def comparison(wildcards):
     """The comparison of the optimisers, where there is one."""
     compared = EXAMPLES[wildcards.example].compared
     return [f"{SOUND}/{wildcards.example}/optimisers.json"] if compared else []
+
+
+def reached(wildcards):
+    """Which modes the solid can have; of a pair it is not asked, as that may take minutes."""
+    is_pair = EXAMPLES[wildcards.example].by_default
+    return [] if is_pair else [f"{SOUND}/{wildcards.example}/{REACHED}"]

@@ -1,6 +1,6 @@
 """The page that leads to the examples."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -12,7 +12,7 @@ from studies.base.page import Section, StudyPage, section
 from studies.base.parts import audio, div, facts, figure, grid, html, prose
 from studies.base.results import Results
 from studies.base.table import Column, Row, Table, hidden, read_table, table
-from studies.sounds.examples import OF_RECORDINGS, WITHOUT_RECORDINGS
+from studies.sounds.examples import OF_CLIPS, OF_RECORDINGS, WITHOUT_RECORDINGS, seeded
 from studies.sounds.results import CLIPS, SoundResults
 
 PLAYED_SECONDS = 1.0
@@ -33,7 +33,10 @@ class Examples(Results):
     @cached_property
     def examples(self) -> list[SoundResults]:
         """Results of every example."""
-        return [SoundResults(self.folder, name) for name in self.config["sound"][self.listed]]
+        return self._named(self.config["sound"][self.listed])
+
+    def _named(self, names: Iterable[str]) -> list[SoundResults]:
+        return [SoundResults(self.folder, name) for name in names]
 
 
 class OfRecordings(Examples):
@@ -46,6 +49,23 @@ class OfRecordings(Examples):
         "Recordings of real strikes, each on a solid of its kind: how close does a material bring "
         "the solid to the clip, and where does it not?"
     )
+
+
+class OfClips(Examples):
+    """The same of pairs of a recording and a solid, designed with all defaults."""
+
+    listed = OF_CLIPS
+    prefix = f"{OF_CLIPS}-"
+    title = "Sounds with all defaults"
+    about = (
+        "A recording, a solid of another kind, and nothing else said: does the design sound like "
+        "the recording, and does it say so where it does not?"
+    )
+
+    @cached_property
+    def seeded(self) -> list[SoundResults]:
+        """Results of the pair that is designed by several seeds."""
+        return self._named(seeded(self.config))
 
 
 @table(
@@ -114,7 +134,7 @@ def page(index: Examples, tables: dict[str, Table]) -> StudyPage:
         kicker="examples",
         lede=index.about,
         sections=[
-            section("Overview", grid(tables["sounds"]), grid(tables["distances"])),
+            section("Overview", *map(grid, tables.values())),
             *map(_heard, index.examples),
         ],
         footer="""This page holds its sounds and numbers; its tables are also files in a folder

@@ -24,6 +24,7 @@ from studies.base.parts import (
     listed,
     pictures,
     plot,
+    prose,
     styled,
     tiles,
 )
@@ -91,6 +92,7 @@ def _result(results: SoundResults, tables: Tables) -> Section:
         for state in ("start", "found")
     }
     several = len(edits) > 1
+    verdict = design.evidence.get("verdict")
     last = " in the last edit" if several else ""
     frequencies = plots.frequency_figure(tables["frequencies"], tables["truth"])
     added = " At every dotted line a target is added, and the search goes on from where it was."
@@ -145,6 +147,9 @@ def _result(results: SoundResults, tables: Tables) -> Section:
                 width="",
             ),
         ),
+        prose(html("<b>Verdict</b> of carillon design: {}.", verdict["sentence"]))
+        if verdict
+        else "",
         grid(tables["designs"]),
         grid(tables["nearness"]),
     )

@@ -83,7 +83,10 @@ class SoundResults(Results):
 
     @cached_property
     def reached(self) -> dict[str, Any]:
-        """Output of `sound reach`; without `modes` where the search was good enough."""
+        """Output of `sound reach`; without `modes` where the search was good enough, and empty of a
+        pair, of which it is not asked."""
+        if self.example.by_default:
+            return {}
         return self.read_json(f"{self.name}/{REACHED}")
 
     @property
@@ -100,12 +103,12 @@ class SoundResults(Results):
     @property
     def origins(self) -> dict[str, Record]:
         """Provenance of every file that the page draws on."""
-        name, compared = self.name, self.optimisers
+        name, compared, reached = self.name, self.optimisers, self.reached
         return {
             **{f"{part}/{DESIGN}": each.provenance for part, each in self.designs.items()},
             f"{name}/{START}": self.start.provenance,
             f"{name}/{TRUTH}": self.truth.provenance,
-            f"{name}/{REACHED}": self.reached["provenance"],
+            **({f"{name}/{REACHED}": reached["provenance"]} if reached else {}),
             **({f"{name}/optimisers.json": compared["provenance"]} if compared else {}),
         }
 

@@ -89,6 +89,8 @@ rule write_project:
         f"{SOUND}/{{part}}/{PROJECT}",
     log:
         f"{LOGS}/{SOUND_FOLDER}/{{part}}/project.log",
+    wildcard_constraints:
+        part=only(part for name in DESCRIBED for part in EXAMPLES[name].parts),
     localrule: True
     params:
         source=source("studies.base.scripts.write_yaml"),
@@ -97,6 +99,24 @@ rule write_project:
         ),
     script:
         "../base/scripts/write_yaml.py"
+
+
+rule init_project:
+    input:
+        example_clips,
+    output:
+        f"{SOUND}/{{example}}/{PROJECT}",
+    log:
+        f"{LOGS}/{SOUND_FOLDER}/{{example}}/project.log",
+    wildcard_constraints:
+        example=only(BY_DEFAULT),
+    resources:
+        **limits("init_project"),
+    params:
+        source=source("sound.commands.init"),
+        mesh=lambda wildcards: EXAMPLES[wildcards.example].mesh,
+    shell:
+        "python -m sound init {output:q} --mesh {params.mesh:q} --clips {input:q} > {log:q} 2>&1"
 
 
 # A single evaluation is that of the uniform material.
@@ -138,7 +158,7 @@ use rule begin_design as design_sound with:
         **limits("design_sound"),
     params:
         source=source("sound.commands.design"),
-        how=lambda wildcards, input: options({"initial_design": str(input.before)}),
+        how=search_options,
 
 
 rule compare_optimisers:
@@ -297,7 +317,7 @@ rule build_sound_page:
         truth=f"{SOUND}/{{example}}/{TRUTH}",
         sounds=all_sounds,
         optimisers=comparison,
-        reached=f"{SOUND}/{{example}}/{REACHED}",
+        reached=reached,
     output:
         f"{SOUND}/{{example}}/page.html",
         tables_in(sounds_study.SOUND, *sounds_study.READ),

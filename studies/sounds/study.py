@@ -5,10 +5,13 @@ from collections.abc import Callable
 from studies.base.study import Config, Study
 from studies.sounds.examples import (
     COMPARISON,
+    DESIGN,
     FOLDER,
+    OF_CLIPS,
     OF_RECORDINGS,
     WITHOUT_RECORDINGS,
     examples,
+    seeded,
 )
 
 READ = ("designs", "frequencies", "nearness", "distances")
@@ -56,6 +59,25 @@ SOUNDS_OF_RECORDINGS = Study(
     page="index:page",
     file=f"{OF_RECORDINGS}.html",
     measured=_made(OF_RECORDINGS),
+)
+SOUNDS_OF_CLIPS = Study(
+    name="sounds_of_clips",
+    package="studies.sounds",
+    folder=FOLDER,
+    title="Sound design with all defaults",
+    results="index:OfClips",
+    tables=("pairs", "seeds"),
+    tabulated="pairs",
+    prefix=f"{OF_CLIPS}-",
+    page="index:page",
+    file=f"{OF_CLIPS}.html",
+    measured=lambda config: [
+        *(f"{name}/page.html" for name in config["sound"][OF_CLIPS]),
+        *(
+            f"{name}/{DESIGN}"
+            for name in dict.fromkeys([*config["sound"][OF_CLIPS], *seeded(config)])
+        ),
+    ],
 )
 COMPARED_SOUNDS = Study(
     name="compared_sounds",

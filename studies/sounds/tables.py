@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from carillon.arrays import Index
 from carillon.fem.model import RIGID_MODES
 from sound.design.objective import fall
 from sound.design.pitch import bark, cents, common_factor
@@ -82,11 +83,13 @@ def designs(results: SoundResults) -> Iterator[Row]:
     Column("damping", "Damping [1/s]", "fraction", "1/s"),
 )
 def frequencies(results: SoundResults) -> Iterator[Row]:
-    """Frequencies of the elastic modes, on the fine solid where the search was checked there. A
-    factor common to all moduli brings them nearest to the targets, by least squares of cents.
-    Differences are in bark, critical bands of hearing."""
+    """Frequencies of the elastic modes, on the fine solid where the search was checked there, but
+    for modes between partials that stay silent. A factor common to all moduli brings them nearest
+    to the targets, by least squares of cents. Differences are in bark, critical bands of
+    hearing."""
     targets = results.design.targets
     return _by_mode(
+        targets.sounding,
         target=targets.frequencies,
         start=results.start.frequencies,
         start_bark=_bark_difference(results.start.frequencies, targets.frequencies),
@@ -111,6 +114,7 @@ def truth(results: SoundResults) -> Iterator[Row]:
     targets, design = results.design.targets.frequencies, results.design
     hertz = results.truth.frequencies[RIGID_MODES : RIGID_MODES + len(targets)]
     return _by_mode(
+        design.targets.sounding,
         target=targets,
         found=design.coarse_frequencies,
         truth=hertz,
@@ -261,7 +265,8 @@ def amplitudes(results: SoundResults) -> Iterator[Row]:
     start, after = balance(results.start), balance(results.design)
     target = shares(targets.amplitudes)
     for point, name in enumerate(targets.names):
-        for row in _by_mode(target=target[point], start=start[point], found=after[point]):
+        columns = {"target": target[point], "start": start[point], "found": after[point]}
+        for row in _by_mode(np.arange(target.shape[1]), **columns):
             yield {"point": name, **row}
 
 
@@ -321,6 +326,6 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _by_mode(**columns: Array) -> Iterator[Row]:
-    for index, values in enumerate(zip(*columns.values())):
-        yield {"mode": index + 1, **dict(zip(columns, map(float, values)))}
+def _by_mode(which: Index, **columns: Array) -> Iterator[Row]:
+    for index in which:
+        yield {"mode": int(index) + 1, **{key: float(columns[key][index]) for key in columns}}

@@ -9,19 +9,23 @@ import numpy as np
 import pytest
 import yaml
 
+from carillon.builtin_names import BUILTIN_PREFIX, THICK
 from carillon.fem.model import RIGID_MODES, fine_model
 from carillon.records.provenance import record
 from solver import solve
 from solver.files.modes_file import write_modes
 from sound.clips.wav import read_wav, write_wav
+from sound.design import preparation
 from sound.project.design import HISTORY_TYPE, Design
 from sound.project.design_file import read_design, write_design
-from sound.project.project import load_project
+from sound.project.project import load_project, project_of
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
+from sound.rendering.verdict import DesignVerdict, Likeness
+from studies.base.table import read_table
 from studies.recordings.recordings import recordings
-from studies.sounds import comparison, config, heard, index, tables
+from studies.sounds import comparison, config, heard, index, pairs, tables
 from studies.sounds.examples import (
     DESIGN,
     ELSEWHERE,
@@ -37,11 +41,12 @@ from studies.sounds.examples import (
     ExampleTarget,
     examples,
     project,
+    seeded,
 )
 from studies.sounds.pictures import fine_mesh
 from studies.sounds.plots import _ticks
 from studies.sounds.results import MODES, SoundResults
-from studies.sounds.study import COMPARED_SOUNDS, SOUND, SOUNDS
+from studies.sounds.study import COMPARED_SOUNDS, SOUND, SOUNDS, SOUNDS_OF_CLIPS
 from tests.pages import Page, assert_holds, assert_same_numbers, assert_self_contained, page_of
 from tests.small_design import N_MODES, SIDES, small_design
 from tests.workflow_runs import TINY, snakemake
@@ -295,6 +300,92 @@ def test_the_index_leads_to_the_page(results, built, tmp_path, listed):
     assert read.source.count("data:audio/wav;base64,") == 2
 
 
+def judged(results: SoundResults, verdict: DesignVerdict | None, seed: int = 0) -> SoundResults:
+    """The same results as those of a pair whose design has a verdict."""
+    told = {} if verdict is None else {"verdict": verdict.as_dict()}
+    design = replace(
+        results.design,
+        evidence={**results.design.evidence, "seconds": 9.0, **told},
+        settings={**results.design.settings, "optimiser": {"seed": seed}},
+    )
+    pair = Box(results.folder, results.name)
+    pair.__dict__["designs"] = {**results.designs, results.name: design}
+    return pair
+
+
+def verdict(word: str, cents: float, distance: float, decay: float) -> DesignVerdict:
+    reason = "" if word == "like" else "too faint"
+    return DesignVerdict(word, cents, (Likeness("corner", distance, 30.0, decay),), reason, "")
+
+
+def of_clips(*pairs: SoundResults) -> SimpleNamespace:
+    listed = index.OfClips
+    return SimpleNamespace(
+        examples=list(pairs),
+        seeded=list(pairs[:1]),
+        title=listed.title,
+        about=listed.about,
+        prefix=listed.prefix,
+        config=CONFIG,
+    )
+
+
+@pytest.mark.parametrize(
+    ("told", "goals"),
+    [
+        (verdict("like", 10.0, 10.0, 0.8), "met"),
+        (verdict("near", 40.0, 23.0, 1.6), "missed: error, decay"),
+        (verdict("near", 10.0, 25.0, 0.5), "missed: distance, decay"),
+        (verdict("cannot", 90.0, 25.0, 0.5), "says it cannot"),
+        (None, None),
+    ],
+)
+def test_a_pair_tells_which_goals_it_misses(results, told, goals):
+    row = pairs.pairs(of_clips(judged(results, told))).rows[0]
+    assert row.get("goals") == goals and row.get("word") == (told and told.word)
+    assert row["heard"] == row["taken"] == N_MODES and row["left_out"] == 0
+    assert row["seconds"] == 9.0 and row["worst_cents"] > 0.0
+
+
+def test_pairs_end_with_their_medians(results):
+    told = [verdict("like", 10.0, 9.0, 0.8), verdict("near", 20.0, 17.0, 1.6), None]
+    *_, last = pairs.pairs(of_clips(*(judged(results, each) for each in told))).rows
+    assert last["title"] == "Median" and last["word"] == "1 like, 1 near"
+    assert last["distance_db"] == 13.0 and last["decay_ratio"] == pytest.approx(1.2)
+    assert last["taken"] == N_MODES and last["goals"] == "missed: distance"
+
+
+def test_modes_of_one_partial_and_partials_without_a_mode_are_counted(results):
+    targets = results.design.targets
+    hertz = targets.frequencies.copy()
+    hertz[1] = hertz[0]
+    silent = np.arange(N_MODES) == 2
+    pair = judged(results, verdict("like", 10.0, 9.0, 0.8))
+    changed = replace(targets, frequencies=hertz, silent=silent, left_out=np.array([9e3]))
+    pair.designs[pair.name] = replace(pair.design, targets=changed)
+    row = pairs.pairs(of_clips(pair)).rows[0]
+    assert (row["heard"], row["taken"], row["left_out"]) == (N_MODES - 1, N_MODES - 2, 1)
+    for table in (tables.frequencies, tables.truth):
+        assert [each["mode"] for each in table(pair).rows] == [1, 2, *range(4, N_MODES + 1)]
+
+
+def test_the_page_of_pairs_leads_to_each_and_has_the_seeds(results, built, tmp_path):
+    pair = judged(results, verdict("near", 40.0, 10.0, 1.0), seed=3)
+    read = page_of(SOUNDS_OF_CLIPS, of_clips(pair), tmp_path / "clips.html")
+    assert_self_contained(read)
+    for name in SOUNDS_OF_CLIPS.tables:
+        assert_same_numbers(read, tmp_path / "tables", f"{SOUNDS_OF_CLIPS.prefix}{name}")
+    assert "box/page.html" in read.led and "too faint" in read.source
+    assert read_table(tmp_path / "tables/clips-seeds.json").rows[0]["seed"] == "3"
+
+
+def test_the_page_of_a_pair_has_its_verdict_and_asks_not_what_the_solid_can_have(results):
+    pair = judged(results, verdict("near", 40.0, 10.0, 1.0))
+    pair.__dict__["example"] = replace(EXAMPLE, by_default=True)
+    assert "reach" in pair.absent and not any(REACHED in name for name in pair.origins)
+    assert "near the clip, not like it: too faint." in SOUND.build(pair)
+
+
 @pytest.mark.parametrize(("low", "high"), [(0.01, 10.0), (0.9, 1.1), (0.3, 7.0), (1.0, 1.002)])
 def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
     ticks = _ticks(low, high)
@@ -304,6 +395,32 @@ def test_a_colour_bar_has_round_ticks_within_its_range(low, high):
 
 def test_the_configuration_names_the_examples():
     assert [*config.EXAMPLES, *config.RECORDED] == list(yaml.safe_load(EXAMPLES.read_text()))
+
+
+def test_pairs_are_of_tonal_recordings_and_built_in_solids():
+    pairs = [each for each in examples(CONFIG).values() if each.by_default]
+    assert len(config.PAIRS) == 12 and len(pairs) == 12 + CONFIG["sound"]["clip_seeds"] - 1
+    for pair in pairs:
+        (target,) = pair.targets
+        assert recordings()[target.recording].tonal
+        assert pair.mesh.removeprefix(BUILTIN_PREFIX) in THICK
+
+
+def test_pairs_have_the_defaults_of_projects():
+    target = {"name": "a", "clip": "a.wav", "vertex": 0}
+    plain = project_of({"mesh": "builtin:bowl", "targets": [target]}, Path())
+    for pair in (each for each in examples(CONFIG).values() if each.by_default):
+        assert pair.resolution == plain.resolution and pair.density == plain.density
+        assert pair.dimensions == plain.material.dimensions
+        assert pair.seconds == plain.optimiser.seconds
+        assert pair.modes == preparation.MODES
+
+
+def test_a_pair_is_searched_by_several_seeds_the_first_of_which_is_the_default():
+    pairs = examples(CONFIG)
+    assert [pairs[name].search["seed"] for name in seeded(CONFIG)] == [None, 1, 2, 3, 4]
+    short = {**CONFIG, "sound": {**CONFIG["sound"], "clip_evaluations": 60}}
+    assert all(examples(short)[name].search["evaluations"] == 60 for name in seeded(short))
 
 
 def test_clips_are_recordings_in_the_examples_that_are_listed_so_and_in_no_other():
@@ -317,7 +434,8 @@ def test_clips_are_recordings_in_the_examples_that_are_listed_so_and_in_no_other
 
 def test_projects_of_all_examples_are_valid_and_their_points_on_the_surface(tmp_path):
     config = {**CONFIG, "results_dir": str(tmp_path)}
-    for example in examples(config).values():
+    for name in (name for key in LISTS for name in CONFIG["sound"][key]):
+        example = examples(config)[name]
         clips = tmp_path / FOLDER / example.name / "clips"
         clips.mkdir(parents=True)
         for target in example.targets:
@@ -367,6 +485,15 @@ def test_examples_of_recordings_are_planned_and_need_no_other(plan):
     assert jobs["take_recording"] == jobs["design_sound"] == jobs["build_sound_page"] == count
     assert jobs["bring_recordings"] == jobs["build_sounds_of_recordings"] == 1
     assert "synthesise_clip" not in jobs and "build_sounds" not in jobs
+
+
+def test_pairs_are_planned_with_their_seeds_and_no_question_what_the_solid_can_have(plan):
+    jobs = plan("sounds_of_clips")
+    count = len(CONFIG["sound"]["clips"])
+    searches = count + CONFIG["sound"]["clip_seeds"] - 1
+    assert jobs["take_recording"] == jobs["init_project"] == jobs["design_sound"] == searches
+    assert jobs["build_sound_page"] == jobs["check_design"] == jobs["begin_design"] == count
+    assert "find_reach" not in jobs and "write_project" not in jobs
 
 
 @pytest.mark.nightly
