@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sound.clips.extraction import ModalSound
-from sound.project.design import Design
+from sound.project.design import Design, MaterialDamping
 from sound.rendering.solid import SoundingSolid
 from sound.rendering.verdict import (
     CANNOT,
@@ -99,6 +99,25 @@ def test_a_design_that_rings_on_where_the_clip_is_over_is_no_likeness():
     verdict = judged(design, clips_of(short))
     assert verdict.word != LIKE and "times longer than the clip" in verdict.reason
     assert min(each.decay_ratio for each in verdict.likeness) > 3.0
+
+
+def test_what_is_advised_about_decay_depends_on_whose_dampings_sound():
+    design = own_sounds()
+    short = clips_of(with_targets(design, dampings=np.full(len(design.frequencies), 60.0)))
+    assert judged(design, short).advice == "strike another point"
+    own = MaterialDamping(None, 0.0, design.targets.dampings)
+    damped = replace(
+        design, damping=own, settings={**design.settings, "damping": {"source": "material"}}
+    )
+    assert "damping: {source: clips}" in judged(damped, short).advice
+
+
+def test_a_wrong_time_of_decay_is_told_beside_another_reason():
+    design = own_sounds()
+    hertz = 1.06 * design.frequencies
+    other = with_targets(design, frequencies=hertz, dampings=np.full(len(hertz), 60.0))
+    reason = judged(with_targets(design, frequencies=hertz), clips_of(other)).reason
+    assert "cents too low, and it rings" in reason and reason.endswith("longer than the clip")
 
 
 def test_a_design_whose_clip_is_gone_is_kept(caplog):

@@ -110,6 +110,9 @@ def judged(design: Design, clips: Sequence[ModalSound]) -> DesignVerdict:
     far = design.targets.shares[which][np.abs(off) > FAR_CENTS].sum()
     word = _word(median, float(far), likeness)
     reason, advice = ("", "") if word == LIKE else _reason(design, clips, solid, off, likeness)
+    rings = _rings(likeness)
+    if rings and rings != reason:
+        reason += f", and {rings}"
     return DesignVerdict(word, median, tuple(likeness), reason, advice)
 
 
@@ -220,14 +223,27 @@ def _reason(
             f"where {design.strikes[point].name} is struck",
             "strike another point, where it moves less",
         )
-    worst_decay = max(likeness, key=lambda each: _ratio(each.decay_ratio))
-    if _ratio(worst_decay.decay_ratio) > LIKE_RATIO:
-        longer = "longer" if worst_decay.decay_ratio > 1.0 else "shorter"
-        return (
-            f"it rings {_ratio(worst_decay.decay_ratio):.1f} times {longer} than the clip",
-            "take the dampings of the clips (damping: source: clips), or strike another point",
-        )
+    rings = _rings(likeness)
+    if rings:
+        return rings, _advice_of_decay(design)
     return "the balance of its partials is another one", "strike another point"
+
+
+def _rings(likeness: Sequence[Likeness]) -> str:
+    """How much longer or shorter a design rings than its clips; empty if it does not."""
+    ratio = max((each.decay_ratio for each in likeness), key=_ratio)
+    if _ratio(ratio) <= LIKE_RATIO:
+        return ""
+    return (
+        f"it rings {_ratio(ratio):.1f} times {'longer' if ratio > 1.0 else 'shorter'} than the clip"
+    )
+
+
+def _advice_of_decay(design: Design) -> str:
+    if design.settings.get("damping", {}).get("source", "clips") == "material":
+        return "take the dampings of the clips (damping: {source: clips})"
+    # Each partial dies away as the clip's: another balance of them makes the difference.
+    return "strike another point"
 
 
 def _falls(design: Design) -> bool:
