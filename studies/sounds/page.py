@@ -136,8 +136,8 @@ def _result(results: SoundResults, tables: Tables) -> Section:
             "pair",
             plot(
                 inlined(plots.cost_figure(results), "cost"),
-                f"""Cost of the best material so far over wall time, and the weighted parts that it
-                is the sum of.{added if several else ""}""",
+                f"""Cost of the best material so far over processor time, and the weighted parts
+                that it is the sum of.{added if several else ""}""",
                 width="",
             ),
             plot(

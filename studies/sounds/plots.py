@@ -26,7 +26,7 @@ _MIN_SHARE = 1e-4
 
 
 def cost_figure(results: SoundResults) -> Figure:
-    """Cost over the wall time of all edits, and the weighted parts that it is the sum of."""
+    """Cost over the processor time of all edits, and the weighted parts that it is the sum of."""
     weights = results.design.settings["weights"]
     lines = {
         "cost": ("cost", INK, 1.0),
@@ -51,7 +51,7 @@ def cost_figure(results: SoundResults) -> Figure:
 
 
 def optimisers_figure(compared: dict[str, Any]) -> Figure:
-    """Cost over wall time by every optimiser."""
+    """Cost over processor time by every optimiser."""
     colours = {"hybrid": COLOURS["ddfem_hcms_ec"], "cma": COLOURS["ddfem_slepc"]}
     figure, axes = plt.subplots(figsize=(4.7, 3.3))
     for row in compared["rows"]:
@@ -123,7 +123,7 @@ def limits(young: Array) -> tuple[float, float]:
 
 
 def _cost_axes(axes: Any) -> None:
-    axes.set(xlabel="wall time [s]", ylabel="cost [1]", title="Cost")
+    axes.set(xlabel="processor time [s]", ylabel="cost [1]", title="Cost")
     logarithmic(axes.yaxis)
 
 

@@ -295,7 +295,7 @@ def shares(amplitudes: Array) -> Array:
 )
 def optimisers(results: SoundResults) -> Iterator[Row]:
     """The hybrid optimiser beside its two parts alone, each from the uniform material and for the
-    same wall time. 90 %: the time in which the cost fell by as much."""
+    same processor time. 90 %: the time in which the cost fell by as much."""
     for row in results.optimisers["rows"]:
         yield {**row, "method": METHODS[row["method"]], "fall": row["fall_percent"] / 100.0}
 
