@@ -150,14 +150,16 @@ def _at_points(surface: Surface, clips: Sequence[str], unit: float) -> list[dict
 
 
 def _heard(options: InitOptions) -> list[str]:
-    """A line for each clip: the partials that count."""
+    """A line for each clip: the partials that count, and what is unusual."""
     from sound.clips.audibility import heard_in_words, heard_partials
+    from sound.clips.extraction import remarks
     from sound.clips.files import extract_file
 
     lines = []
     for clip in options.clips or ():
         sound = extract_file(clip, visible=True, allow_clipped=options.allow_clipped)
-        lines.append(f"{clip}: {heard_in_words(heard_partials(sound).frequencies)}")
+        heard = heard_in_words(heard_partials(sound).frequencies)
+        lines.append(f"{clip}: {'; '.join([heard, *remarks(sound.evidence)])}")
     return lines
 
 
