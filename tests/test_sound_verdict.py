@@ -120,6 +120,20 @@ def test_a_wrong_time_of_decay_is_told_beside_another_reason():
     assert "cents too low, and it rings" in reason and reason.endswith("longer than the clip")
 
 
+def test_what_is_unusual_of_a_clip_is_told():
+    design = own_sounds()
+    short = clips_of(with_targets(design, dampings=np.full(len(design.frequencies), 60.0)))
+    told = {
+        "explained": 0.99,
+        "clipped_samples": 0,
+        "second_strike_seconds": 0.21,
+        "glide": None,
+    }
+    loop = [replace(clip, evidence=told) for clip in short]
+    said = "; of the clip: there is another strike at 0.21 s, left out"
+    assert judged(design, loop).reason.count(said) == 1
+
+
 def test_a_design_whose_clip_is_gone_is_kept(caplog):
     design = own_sounds()
     assert with_verdict(design) is design  # Its settings name no clips.

@@ -9,7 +9,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
-from sound.clips.extraction import ModalSound
+from sound.clips.extraction import ModalSound, remarks
 from sound.clips.files import extract_file
 from sound.clips.noise import noise_part
 from sound.design.pitch import cents
@@ -113,6 +113,9 @@ def judged(design: Design, clips: Sequence[ModalSound]) -> DesignVerdict:
     rings = _rings(likeness)
     if rings and rings != reason:
         reason += f", and {rings}"
+    if word != LIKE:
+        unusual = [each for clip in clips if clip.evidence for each in remarks(clip.evidence)]
+        reason += "".join(f"; of the clip: {each}" for each in dict.fromkeys(unusual))
     return DesignVerdict(word, median, tuple(likeness), reason, advice)
 
 
