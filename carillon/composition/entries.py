@@ -137,7 +137,8 @@ class RegionEntry:
         return [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
 
     def in_folder(self, folder: Path) -> RegionEntry:
-        """The same with its files, which are relative to a folder, as the working directory has."""
+        """The region with the paths of its files, relative to a folder, seen from the working
+        directory."""
         named = {"mesh": self.mesh, "labels": self.labels}
         there = {key: in_folder(name, folder) for key, name in named.items() if name}
         return replace(self, **there)  # type: ignore[arg-type]
