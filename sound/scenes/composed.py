@@ -36,7 +36,7 @@ _VERSION = 2  # counted up when other modes are found than before
 
 
 class ComposedObject:
-    """What an object of a scene is made of, and its solid, in metres and in axes whose z points up.
+    """Regions, supports and solid of a scene's object, in metres and in axes whose z points up.
 
     Raises UserError for regions or supports that describe nothing.
     """
