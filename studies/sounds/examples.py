@@ -17,7 +17,7 @@ from workflow.settings import located
 
 EXAMPLES = Path(__file__).with_name("examples.yaml")
 BY_DEFAULT = Path(__file__).with_name("pairs.yaml")
-"""What pairs of a recording and a solid have in common."""
+"""File of the settings that all pairs of a recording and a solid share."""
 FOLDER = "sound"
 """Folder of the examples beside the run's configuration."""
 PROJECT, DESIGN, START, TRUTH = "project.yaml", "design.h5", "start.h5", "truth.h5"

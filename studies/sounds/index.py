@@ -52,7 +52,7 @@ class OfRecordings(Examples):
 
 
 class OfClips(Examples):
-    """The same of pairs of a recording and a solid, designed with all defaults."""
+    """Results of all pairs of a recording and a solid, designed with all defaults."""
 
     listed = OF_CLIPS
     prefix = f"{OF_CLIPS}-"
