@@ -52,6 +52,7 @@ def test_analyses_are_those_that_were_asked_for(problem, tmp_path, method, most,
     assert made == design.evidence["evaluations"] == design.history["evaluations"][-1]
     assert most - 1 <= made <= most
     assert design.evidence["cost"] <= design.evidence["cost_start"]
+    assert design.evidence["ended_by"] == "budget"
 
 
 @pytest.mark.parametrize("fine_check", [False, True])

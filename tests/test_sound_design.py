@@ -168,6 +168,7 @@ def test_a_worse_material_than_that_of_the_start_is_not_saved(problem):
         own_seconds=1.0,
         own_evaluations=2,
         checks=[],
+        ending="budget",
     )
     costs = [
         Outcome(problem, np.empty(0, HISTORY_TYPE)).of(SimpleNamespace(**{**vars(search), **other}))

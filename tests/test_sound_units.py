@@ -20,7 +20,13 @@ RATE, DAMPING = 8000, 9.0
 def designed(**targets) -> Design:
     """A small design as a search leaves it, its dampings the material's: half the clips'."""
     costs = {"cost_start": 2.0, "cost": 1.0, "frequency_cost": 0.6, "amplitude_cost": 0.4}
-    effort = {"seconds": 1.0, "evaluations": 9, "evaluations_per_minute": 540.0, "workers": 1}
+    effort = {
+        "seconds": 1.0,
+        "evaluations": 9,
+        "evaluations_per_minute": 540.0,
+        "workers": 1,
+        "ended_by": "budget",
+    }
     others = {"method": "hybrid", "checks": [], "residual_max": 1e-9}
     made = small_design()
     return replace(
@@ -52,6 +58,25 @@ def test_partials_without_a_mode_and_dampings_far_from_the_clips_are_told():
     assert summary["left_out_hz"] == [812.4, 1400.0] and summary["damping_source"] == "material"
     said = _sentences(Path("design.h5"), damped, summary)
     assert "it rings longer than its clips: take their dampings (damping: {source: clips})" in said
+
+
+def test_moduli_that_no_material_has_are_told():
+    design = designed()
+    said = _sentences(Path("design.h5"), design, summarise(design))
+    assert "warning" not in said
+    for factor, words in ((1e6, "stiffer than diamond"), (1e-4, "softer than rubber")):
+        made = replace(design, young=factor * design.young)
+        assert words in _sentences(Path("design.h5"), made, summarise(made))
+
+
+@pytest.mark.parametrize(
+    ("ended_by", "says"), [("met", "its frequencies are met"), ("interrupt", "on request")]
+)
+def test_a_search_that_ended_early_says_why(ended_by, says):
+    design = designed()
+    assert "ended" not in _sentences(Path("design.h5"), design, summarise(design))
+    early = replace(design, evidence={**design.evidence, "ended_by": ended_by})
+    assert says in _sentences(Path("design.h5"), early, summarise(early))
 
 
 def test_a_damping_stands_beside_the_time_of_60_decibels(tmp_path, monkeypatch, capsys):

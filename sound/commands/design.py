@@ -27,15 +27,23 @@ if TYPE_CHECKING:
     from sound.design.search import Search
     from sound.project.design import Design
     from sound.project.project import Project
+    from sound.project.settings import OptimiserSettings
 
 ENDINGS = (".h5", ".hdf5")
 """Endings of the names of designs."""
 SLOW = ("trimesh", "sound.design.optimise")
 """Modules that take seconds to load and that `--help` does not need."""
 _COSTS = ("cost_start", "cost", "frequency_cost", "amplitude_cost")
-_EFFORT = ("seconds", "evaluations", "evaluations_per_minute", "workers", "method")
+_EFFORT = ("seconds", "evaluations", "evaluations_per_minute", "workers", "method", "ended_by")
+_ENDINGS = {
+    "met": "; ended early: its frequencies are met, and the cost falls no more",
+    "interrupt": "; ended on request",
+}
+"""What is told of the ending of a search; nothing of one that used up its budget."""
 FAR_DAMPINGS = 1.5
 """Factor by which the dampings of a material are, in the median, far from those of the clips."""
+STIFFEST, SOFTEST = 1.2e12, 1e6
+"""Young's moduli [Pa] of diamond and of soft rubber."""
 SHOWN_EVERY = 1.0
 """Time between two progress lines on a terminal [s]."""
 
@@ -104,11 +112,18 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         initial = read_design(options.initial_design)
     elif out.exists() and not options.restart:
         initial = read_design(out)
+    say("preparing: partials of the clips, voxels, modes of the solid", sys.stderr.isatty())
     problem = prepare(project)
     if initial is not None:
         require_same_voxels(problem, initial)
         so_far = initial.history["evaluations"][-1:].sum()
-        say(f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations")
+        say(
+            f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations, "
+            f"{_budget(project.optimiser, ' more')}"
+        )
+    elif not options.watch:
+        count = "1 process" if problem.workers == 1 else f"{problem.workers} processes"
+        say(f"searching on {count}, {_budget(project.optimiser)}")
     show = _SearchProgress().show
     if options.watch:
         result = design_on(edited, problem, initial, out, show)
@@ -133,6 +148,15 @@ def _with_settings(project: Project, settings: SearchOptions, options: DesignOpt
         budget = replace(budget, seconds=None)
     project = replace(project, optimiser=budget)
     return with_optimiser(project, **asdict(settings), fine_check=options.fine_check)
+
+
+def _budget(optimiser: OptimiserSettings, more: str = "") -> str:
+    limits = []
+    if optimiser.seconds is not None:
+        limits.append(f"{optimiser.seconds:g} s of processor time")
+    if optimiser.evaluations is not None:
+        limits.append(f"{optimiser.evaluations:,} evaluations")
+    return f"for {' or '.join(limits)}{more}" if limits else "until it is interrupted"
 
 
 class _SearchProgress:
@@ -179,7 +203,8 @@ def summarise(design: Design) -> dict[str, Any]:
         **{key: evidence[key] for key in _EFFORT},
         "extents_m": np.ptp(design.surface_vertices, axis=0).tolist(),
         "modes": len(design.frequencies),
-        "partials": len(which),
+        # Two modes of one frequency may have one partial.
+        "partials": len(np.unique(targets.frequencies[which])),
         "left_out_hz": [] if targets.left_out is None else targets.left_out.tolist(),
         "left_out_share_of_loudness": targets.left_out_share,
         "targets": [strike.name for strike in design.strikes],
@@ -232,7 +257,8 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
         [
             f"cost {summary['cost_start']:.4g} -> {summary['cost']:.4g} ({summary['fall']:.1%} "
             f"less) in {summary['seconds']:.1f} s and {summary['evaluations']:,} evaluations "
-            f"({summary['evaluations_per_minute']:,.0f} a minute, {summary['workers']} workers)",
+            f"({summary['evaluations_per_minute']:,.0f} a minute, {summary['workers']} workers)"
+            f"{_ENDINGS.get(summary['ended_by'], '')}",
             f"frequencies of {summary['partials']} partials among {summary['modes']} modes: "
             f"median error {summary['frequency_error_median_cents']:.1f} cents, worst "
             f"{summary['frequency_error_max_cents']:.1f} cents; "
@@ -287,6 +313,12 @@ def _material_sentences(design: Design, summary: dict[str, Any]) -> list[str]:
     beyond = np.mean((design.young < 0.999 * least) | (design.young > 1.001 * most))
     if beyond:
         lines[-1] += f"; {beyond:.1%} of the voxels are beyond young_bounds"
+    if high > STIFFEST or low < SOFTEST:
+        than = "stiffer than diamond" if high > STIFFEST else "softer than rubber"
+        lines.append(
+            f"warning: that is {than}; look at the size of the solid, or let its density give way "
+            "(young_bounds below material)"
+        )
     return lines
 
 

@@ -158,6 +158,7 @@ class Outcome:
             "seconds": seconds,
             "evaluations": evaluations,
             "evaluations_per_minute": 60.0 * evaluations / seconds,
+            "ended_by": search.ending,
             "scale_of_moduli": heavier * stretch**2,
             "residual_max": evaluation.modes.evidence["residual_max"],
             "orthogonality": evaluation.modes.evidence["orthogonality"],

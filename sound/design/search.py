@@ -24,6 +24,11 @@ ENDLESS_SECONDS = 60.0
 """Duration [s] that legs are shares of in a search without a budget."""
 
 
+UNDER_WAY, BUDGET, INTERRUPT, MET = "", "budget", "interrupt", "met"
+"""What ended a search: nothing yet; its budget; someone; that its frequencies are met and its cost
+falls no more."""
+
+
 class BudgetSpentError(Exception):
     """Time or evaluations are used up, or an interrupt came."""
 
@@ -83,6 +88,8 @@ class Search:
         `sound.design.space_mapping`, and the best trial by them.
     spent
         Whether the whole budget is used up, or an interrupt came.
+    ending
+        What ended the search, such as `BUDGET`.
     """
 
     def __init__(
@@ -98,6 +105,7 @@ class Search:
         self.start: Trial | None = None
         self.history: list[HistoryEntry] = []
         self.spent = False
+        self.ending = UNDER_WAY
         self.checks: list[CheckEntry] = []
         self.best_checked: Trial | None = None
         self._objective: Objective | None = None
@@ -173,7 +181,7 @@ class Search:
         self._record(trials, begin)
         if self._watch is not None and self._watch(self):
             self._is_last = True
-            self._end()
+            self._end(INTERRUPT)
         if self.own_seconds >= self._leg_budget or len(trials) < len(tasks):
             self._end()
         return trials
@@ -187,10 +195,12 @@ class Search:
         if step is not None:
             self._record([Trial(step.z, step.cost, 0, eigenvalues=step.eigenvalues)], begin)
         self._is_last = True
-        self._end()
+        self._end(INTERRUPT)
 
-    def _end(self) -> NoReturn:
+    def _end(self, ending: str = BUDGET) -> NoReturn:
         self.spent = self._is_last
+        if self.spent:
+            self.ending = ending
         raise BudgetSpentError
 
     def _affordable(self, tasks: Sequence[Task], seconds: float) -> list[Task]:

@@ -20,7 +20,7 @@ from sound.design.fine_check import FineModes
 from sound.design.objective import Objective
 from sound.design.optimisers import descend_finely
 from sound.design.pitch import rms_cents, rms_off_partials
-from sound.design.search import BudgetSpentError, CheckEntry, Search, require_modes
+from sound.design.search import MET, BudgetSpentError, CheckEntry, Search, require_modes
 from sound.design.simulation import Evaluation
 from sound.design.tasks import SearchStep, Trial
 
@@ -119,6 +119,8 @@ class SpaceMapping:
             fruitless = fruitless + 1 if self.best.total > (1.0 - GAIN) * best.total else 0
             share = min(LONGER * share, LARGEST_SHARE)
             seed += 1
+        if not search.spent:
+            search.ending = MET
 
     def foretold(self, step: SearchStep) -> Array:
         """Expected frequencies (N,) [Hz] of the fine solid, in the order of the coarse modes."""
