@@ -174,3 +174,15 @@ def test_a_user_with_a_cache_keeps_numbas_own_rules(tmp_path):
     environment = {"XDG_CACHE_HOME": str(tmp_path)}
     kernel_cache.configure(environment)
     assert list(environment) == ["XDG_CACHE_HOME"]
+
+
+def test_the_first_compilation_of_a_process_is_told(tmp_path):
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    script = (
+        "from carillon.processes import kernel_cache\n"
+        "kernel_cache.tell_compilation(lambda: print('compiling'))\n"
+        "import kernel\n"
+        "print(kernel.twice(2), kernel.twice(2.5))\n"
+    )
+    said = [python("-c", script, cwd=tmp_path).stdout for _ in range(2)]
+    assert said == ["compiling\n4 5.0\n", "4 5.0\n"]

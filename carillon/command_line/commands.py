@@ -15,9 +15,12 @@ from carillon.command_line import exit_status
 from carillon.command_line.arguments import Parser
 from carillon.command_line.progress import say
 from carillon.errors import UserError, on_all_ranks
-from carillon.processes import mpi_environment, present_folder
+from carillon.processes import kernel_cache, mpi_environment, present_folder
 from carillon.processes.ranks import world
 from carillon.processes.waiting import leave_cores
+
+COMPILING = "compiling kernels for this processor, once: a minute or two"
+"""Told on a terminal, where nothing else would be seen for that long."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ def run_program(
     elif lonely := mpi_environment.lonely_among(os.environ):
         say(f"warning: {lonely}")
 
+    if sys.stderr.isatty() and (comm is None or comm.rank == 0):
+        kernel_cache.tell_compilation(partial(say, COMPILING))
     everything = {**commands, **unlisted}
 
     @on_all_ranks()

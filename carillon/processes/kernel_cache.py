@@ -44,6 +44,14 @@ _COMPILED = ("*.nbc", "*.nbi")
 """Files of numba's: code, and after it the index that names it."""
 
 
+_on_compilation: list[Callable[[], None]] = []
+
+
+def tell_compilation(tell: Callable[[], None]) -> None:
+    """Call `tell` when this process has to compile a kernel, the first time only."""
+    _on_compilation[:] = [tell]
+
+
 def configure(environment: MutableMapping[str, str]) -> None:
     """Have numba ask `Locator` where to keep kernels, if the user's cache cannot be written.
 
@@ -125,6 +133,7 @@ def _mended() -> Iterator[None]:
         return
     caching.IndexDataCacheFile.save = _save
     caching.Cache.__init__ = _with_stamp_of_what_it_uses(caching.Cache.__init__)
+    caching.Cache.load_overload = _telling_of_missing(caching.Cache.load_overload)
     for elsewhere in (caching.UserProvidedCacheLocator, caching.UserWideCacheLocator):
         elsewhere.ensure_cache_path = _ensure_copy
 
@@ -137,6 +146,16 @@ def _save(self: Any, key: Any, compiled: Any) -> None:
         index[key] = f"{self._index_name.removesuffix('.nbi')}.{content}.nbc"
         self._save_index(index)
     self._save_data(index[key], compiled)
+
+
+def _telling_of_missing(load: Callable[..., Any]) -> Callable[..., Any]:
+    def loaded(self: Any, *given: Any, **named: Any) -> Any:
+        kernel = load(self, *given, **named)
+        if kernel is None and _on_compilation:
+            _on_compilation.pop()()
+        return kernel
+
+    return loaded
 
 
 def _with_stamp_of_what_it_uses(begin: Callable[[Any, Any], None]) -> Callable[[Any, Any], None]:
