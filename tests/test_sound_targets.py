@@ -199,7 +199,7 @@ def test_extract_command_says_where_most_is_no_mode(clips, tmp_path, capsys):
     assert main(["extract", str(clips / "a.wav"), "--modes", "2"]) == 0
     assert "noise" not in capsys.readouterr().out
     assert main(["extract", str(tmp_path / "noisy.wav")]) == 0
-    assert "the rest is noise" in capsys.readouterr().out
+    assert "of its energy is noise" in capsys.readouterr().out
 
 
 def test_extract_command_names_the_bad_clip(clips, tmp_path, refuses):

@@ -1,22 +1,18 @@
 """Whether a design sounds like its clips, in words."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from solver.response.vertices import inward_normals
 from sound.clips.extraction import ModalSound
 from sound.project.design import Design, MaterialDamping
+from sound.rendering.likeness import LIKE_DECIBELS, decay_seconds
 from sound.rendering.solid import SoundingSolid
-from sound.rendering.verdict import (
-    CANNOT,
-    FAR_SHARE,
-    LIKE,
-    NEAR,
-    decay_seconds,
-    judged,
-    with_verdict,
-)
+from sound.rendering.verdict import CANNOT, FAR_SHARE, LIKE, NEAR, judged, with_verdict
 from sound.synthesis.sinusoids import damped_sinusoids
 from tests.small_design import small_design
 
@@ -104,7 +100,8 @@ def test_a_design_that_rings_on_where_the_clip_is_over_is_no_likeness():
 def test_what_is_advised_about_decay_depends_on_whose_dampings_sound():
     design = own_sounds()
     short = clips_of(with_targets(design, dampings=np.full(len(design.frequencies), 60.0)))
-    assert judged(design, short).advice == "strike another point"
+    # The box with equal dampings dies away alike wherever it is struck.
+    assert "no other point of this design comes nearer" in judged(design, short).advice
     own = MaterialDamping(None, 0.0, design.targets.dampings)
     damped = replace(
         design, damping=own, settings={**design.settings, "damping": {"source": "material"}}
@@ -130,8 +127,9 @@ def test_what_is_unusual_of_a_clip_is_told():
         "glide": None,
     }
     loop = [replace(clip, evidence=told) for clip in short]
-    said = "; of the clip: there is another strike at 0.21 s, left out"
-    assert judged(design, loop).reason.count(said) == 1
+    assert judged(design, loop).sentence().count("there is another strike at 0.21 s, left out") == 1
+    own = [replace(clip, evidence=told) for clip in clips_of(design)]
+    assert judged(design, own).sentence().startswith("like the clip; of the clip: there is another")
 
 
 def test_a_design_whose_clip_is_gone_is_kept(caplog):
@@ -151,3 +149,74 @@ def test_times_of_decay_are_those_of_the_mode(rate, damping):
     sound = damped_sinusoids(440.0 * one, damping * one, one, 0.0 * one, rate, 4 * rate)
     assert decay_seconds(sound, rate) == pytest.approx(np.log(1e3) / damping, rel=0.02)
     assert decay_seconds(np.zeros(100), rate) == 0.0
+
+
+def struck_elsewhere() -> tuple[Design, np.ndarray]:
+    """A design whose first clip is the sound of another point, and that point (3,) [m]."""
+    design = own_sounds()
+    solid, surface = SoundingSolid.of_design(design), surface_of(design)
+    middle = np.argmin(np.linalg.norm(surface.vertices - surface.bounds.mean(axis=0), axis=1))
+    position = np.asarray(surface.vertices[middle])[None]
+    levels = solid.amplitudes(position, inward_normals(surface, position))[0]
+    amplitudes = design.targets.amplitudes.copy()
+    amplitudes[0] = 0.2 * levels / levels.max()
+    return with_targets(design, amplitudes=amplitudes), position[0]
+
+
+def surface_of(design: Design) -> trimesh.Trimesh:
+    return trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_the_point_that_the_clip_sounds_like_is_advised(unit):
+    design, position = struck_elsewhere()
+    clips = clips_of(design)
+    design = replace(design, settings={**design.settings, "unit": unit})
+    now = judged(design, clips)
+    assert now.word != LIKE and f"strike {design.strikes[0].name} at [" in now.advice
+    at = unit * np.array(
+        [float(each) for each in re.findall(r"\[(.*?)\]", now.advice)[0].split(", ")]
+    )
+    inward = inward_normals(surface_of(design), at[None])[0]
+    first = replace(design.strikes[0], position=at, inward=inward)
+    there = judged(replace(design, strikes=[first, design.strikes[1]]), clips).likeness[0]
+    assert there.excess < 0.9 * now.likeness[0].excess
+    assert f"there it is {there.distance_db:.1f} dB" in now.advice
+    assert np.linalg.norm(at - position) < 1e-3 or there.distance_db < LIKE_DECIBELS
+
+
+@pytest.mark.parametrize(
+    ("ended_by", "costs", "says"),
+    [
+        ("budget", [5.0], "it had little time"),
+        ("interrupt", [5.0, 4.9], "it had little time"),
+        ("budget", [5.0, 4.0, 3.0, 2.0], "the cost still falls"),
+        ("budget", [5.0, 3.0, 2.99, 2.98], ""),
+        ("met", [5.0, 4.0, 3.0], ""),
+        ("budget", [], "the cost still falls"),  # as the history of the design says
+    ],
+)
+def test_to_search_on_is_advised_where_that_may_help(ended_by, costs, says):
+    design = own_sounds()
+    checks = [{"cost": cost} for cost in costs]
+    design = replace(design, evidence={"ended_by": ended_by, "checks": checks})
+    wrong = with_targets(design, frequencies=1.06 * design.frequencies)
+    advice = judged(wrong, clips_of(design)).advice
+    assert ("search on" in advice) == bool(says) and says in advice
+
+
+def test_a_clip_that_is_mostly_no_strike_is_told():
+    design = own_sounds()
+    hum = 0.3 * np.sin(2.0 * np.pi * 310.0 * np.arange(RATE) / RATE)
+    verdict = judged(design, [replace(clip, residual=hum) for clip in clips_of(design)])
+    assert verdict.word != LIKE
+    assert "tones that do not fade evenly" in verdict.reason and "one strike" in verdict.advice
+
+
+def test_twin_modes_of_a_partial_count_once():
+    design = own_sounds()
+    hertz = design.frequencies.copy()
+    hertz[1] = hertz[0] = 1.1 * hertz[1]
+    design = with_targets(design, frequencies=hertz)
+    partials = len(hertz) - 1
+    assert f"1 of {partials} partials are more" in judged(design, clips_of(design)).reason

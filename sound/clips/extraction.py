@@ -261,8 +261,15 @@ def remarks(evidence: Mapping[str, Any]) -> list[str]:
     sentences = []
     if evidence["explained"] < MOSTLY_MODES:
         sentences.append(
-            "the rest is noise, or tones that do not fade evenly, and no material has it"
+            f"{1.0 - evidence['explained']:.0%} of its energy is noise, or tones that do not fade "
+            "evenly, which no material has"
         )
+    return [*sentences, *oddities(evidence)]
+
+
+def oddities(evidence: Mapping[str, Any]) -> list[str]:
+    """The remarks on what else than free vibration is in the evidence of a `ModalSound`."""
+    sentences = []
     if evidence["clipped_samples"]:
         sentences.append(f"{evidence['clipped_samples']} samples at full scale are left out")
     if evidence["second_strike_seconds"] is not None:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from sound.design.pitch import cents
-from sound.rendering.verdict import (
-    CANNOT,
+from sound.rendering.likeness import (
     LIKE_CENTS,
     LIKE_DECIBELS,
     LIKE_RATIO,
     NEARER_DECIBELS,
 )
+from sound.rendering.verdict import CANNOT
 from studies.base.conditions import ONE_COLD_RUN, Conditions, measured
 from studies.base.table import Column, Row, hidden, table
 from studies.sounds.index import OfClips

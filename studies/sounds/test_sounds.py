@@ -19,10 +19,11 @@ from sound.design import preparation
 from sound.project.design import HISTORY_TYPE, Design
 from sound.project.design_file import read_design, write_design
 from sound.project.project import load_project, project_of
+from sound.rendering.likeness import Likeness
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, rendered_parts
 from sound.rendering.solid import SoundingSolid
-from sound.rendering.verdict import DesignVerdict, Likeness
+from sound.rendering.verdict import DesignVerdict
 from studies.base.table import read_table
 from studies.recordings.recordings import recordings
 from studies.sounds import comparison, config, heard, index, pairs, tables

@@ -1,0 +1,184 @@
+"""What stands most between a design and its clips, and what may help."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from carillon.arrays import Array
+from sound.clips.extraction import ModalSound
+from sound.design.search import BUDGET, INTERRUPT
+from sound.project.design import Design
+from sound.rendering.better_point import better_point
+from sound.rendering.likeness import LIKE_RATIO, Likeness, furthest_decay
+from sound.rendering.listening import Listening
+from sound.rendering.solid import SoundingSolid
+
+LOUD_DECIBELS = 12.0
+"""Error of a partial's level [dB] that is told."""
+GAIN = 0.05
+"""Share of the cost that the last part of a search takes off if it gets on."""
+FEW_CHECKS = 3
+"""Least number of checks on the fine solid by which a search tells whether its cost still falls."""
+FAR_CENTS = 50.0
+"""Distance of a partial [cents] that is told."""
+MOSTLY = 0.5
+"""Share of a clip's energy in what is no mode, beyond which this is told first."""
+ANOTHER_SOLID = "take another solid"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A design beside its clips: its solid, what is heard of it, distances of its partials (p,)
+    [cents], and its likeness to each clip."""
+
+    design: Design
+    clips: Sequence[ModalSound]
+    solid: SoundingSolid
+    listening: Listening
+    cents: Array
+    likeness: Sequence[Likeness]
+
+
+def reason_of(judged: Judged) -> tuple[str, str]:
+    """What stands most between a design and its clips, and one suggestion."""
+    for find in (_of_clip, _left_out, _far, _loud, _decay):
+        found = find(judged)
+        if found is not None:
+            return found
+    worst = max(judged.likeness, key=lambda each: each.distance_db)
+    return "the balance of its partials is another one", _elsewhere(judged, worst)
+
+
+def rings(likeness: Sequence[Likeness]) -> str:
+    """How much longer or shorter a design rings than its clips; empty if it does not."""
+    worst = furthest_decay(likeness)
+    if worst.times <= LIKE_RATIO:
+        return ""
+    side = "longer" if worst.decay_ratio > 1.0 else "shorter"
+    return f"it rings {worst.times:.1f} times {side} than the clip"
+
+
+def foreign_share(clips: Sequence[ModalSound]) -> float:
+    """Greatest share of a clip's energy in what is no mode: noise, and tones that do not fade
+    evenly."""
+    return max(_foreign(clip) for clip in clips)
+
+
+def _foreign(clip: ModalSound) -> float:
+    whole = clip.modal_part() + clip.residual
+    return float(clip.residual @ clip.residual) / max(float(whole @ whole), 1e-300)
+
+
+def _of_clip(judged: Judged) -> tuple[str, str] | None:
+    share = foreign_share(judged.clips)
+    if share <= MOSTLY:
+        return None
+    return (
+        f"{min(share, 1.0):.0%} of the clip's energy is noise, or tones that do not fade evenly, "
+        "which no material has",
+        "take a clip of one strike that rings",
+    )
+
+
+def _left_out(judged: Judged) -> tuple[str, str] | None:
+    targets = judged.design.targets
+    far = np.abs(judged.cents) > FAR_CENTS
+    missing = targets.left_out
+    if missing is None or targets.left_out_share <= targets.shares[targets.sounding][far].sum():
+        return None
+    hertz = ", ".join(f"{each:.0f}" for each in missing)
+    return (
+        f"no mode of the solid can have the clip's partials at {hertz} Hz",
+        "take a solid with more modes below them: a longer, larger or thinner one",
+    )
+
+
+def _far(judged: Judged) -> tuple[str, str] | None:
+    off, targets = judged.cents, judged.design.targets
+    which, far = targets.sounding, np.abs(off) > FAR_CENTS
+    if not far.any():
+        return None
+    worst = int(np.argmax(np.where(far, targets.shares[which], -1.0)))
+    # Two modes of one frequency may have one partial.
+    hertz = targets.frequencies[which]
+    wrong, partials = np.unique(hertz[far]), len(np.unique(hertz))
+    side = "high" if off[worst] > 0.0 else "low"
+    return (
+        f"{len(wrong)} of {partials} partials are more than {FAR_CENTS:.0f} cents off, that at "
+        f"{hertz[worst]:.0f} Hz {abs(off[worst]):.0f} cents too {side}",
+        _search_on(judged.design) or _without(wrong, partials),
+    )
+
+
+def _search_on(design: Design) -> str:
+    """Advice to search on, where a search ended before it had found what it can."""
+    checks = [each["cost"] for each in design.evidence.get("checks", [])]
+    costs = np.minimum.accumulate(checks)
+    if design.evidence.get("ended_by") not in (BUDGET, INTERRUPT):
+        return ""
+    if 0 < len(costs) < FEW_CHECKS:
+        return "search on, it had little time"
+    if not len(costs):  # The search was on the fine solid itself.
+        history = np.minimum.accumulate(design.history["cost"])
+        costs = history[[(len(history) - 1) // 2, -1]]
+    return (
+        "search on, the cost still falls"
+        if costs[-1] < (1.0 - GAIN) * costs[-FEW_CHECKS:][0]
+        else ""
+    )
+
+
+def _without(hertz: Array, partials: int) -> str:
+    if len(hertz) > 0.5 * partials:
+        return ANOTHER_SOLID
+    listed = ", ".join(f"{each:.0f}" for each in hertz)
+    return f"leave these out (without: [{listed}]), or {ANOTHER_SOLID}"
+
+
+def _loud(judged: Judged) -> tuple[str, str] | None:
+    """A mode that is too loud where a target is struck."""
+    strikes, targets = judged.design.strikes, judged.design.targets
+    positions = np.array([strike.position for strike in strikes])
+    inward = np.array([strike.inward for strike in strikes])
+    levels = judged.solid.amplitudes(positions, inward)
+    own = 20.0 * np.log10(np.maximum(levels / levels.max(axis=1, keepdims=True), 1e-9))
+    aims = targets.amplitudes / targets.amplitudes.max(axis=1, keepdims=True)
+    wrong = np.where(aims > 0.0, own - 20.0 * np.log10(np.maximum(aims, 1e-9)), 0.0)
+    point, mode = divmod(int(np.argmax(wrong)), wrong.shape[1])
+    if wrong[point, mode] <= LOUD_DECIBELS:
+        return None
+    return (
+        f"the mode at {judged.solid.frequencies[mode]:.0f} Hz is {wrong[point, mode]:.0f} dB too "
+        f"loud where {strikes[point].name} is struck",
+        _elsewhere(judged, judged.likeness[point]),
+    )
+
+
+def _decay(judged: Judged) -> tuple[str, str] | None:
+    told = rings(judged.likeness)
+    if not told:
+        return None
+    if judged.design.settings.get("damping", {}).get("source", "clips") == "material":
+        return told, "take the dampings of the clips (damping: {source: clips})"
+    # Each partial dies away as the clip's: another balance of them makes the difference.
+    return told, _elsewhere(judged, furthest_decay(judged.likeness))
+
+
+def _elsewhere(judged: Judged, now: Likeness) -> str:
+    """Advice to strike another point, if one is better."""
+    design = judged.design
+    target = [strike.name for strike in design.strikes].index(now.target)
+    clip = judged.clips[target]
+    whole = clip.modal_part() + clip.residual
+    found = better_point(design, judged.solid, judged.listening, target, whole, clip.rate, now)
+    if found is None:
+        return f"no other point of this design comes nearer: {ANOTHER_SOLID}"
+    unit = design.settings.get("unit", 1.0)
+    at = ", ".join(f"{each:.4g}" for each in found[0] / unit)
+    there = found[1]
+    return (
+        f"strike {now.target} at [{at}] instead: there it is {there.distance_db:.1f} dB from the "
+        f"clip (now {now.distance_db:.1f}) and rings {there.decay_ratio:.1f} times as long (now "
+        f"{now.decay_ratio:.1f})"
+    )
