@@ -196,6 +196,8 @@ export interface BankHeader {
   left_out_hz?: number[];
   /** Whether a design sounds like its clips, in words; of other materials, nothing. */
   verdict?: string | null;
+  /** What ended the search for a design: its budget, an interrupt, or that its frequencies are met. */
+  ended_by?: string | null;
   arrays?: ArrayHeader[];
 }
 

@@ -191,6 +191,7 @@ class SolidProcess:
             "checked": bool(made.evidence.get("checks")),
             "rigid_motions": made.model.rigid_modes,
             "verdict": (made.evidence.get("verdict") or {}).get("sentence"),
+            "ended_by": made.evidence.get("ended_by"),
         }
         return bank(heard, self._positions, self._aimed(), {**told, **header})
 

@@ -15,6 +15,7 @@ const HEIGHT = 200;
 const MOST_ROWS = 1000;
 /** Parts this far below the cost say nothing, and would squeeze what does. */
 const LEAST_SHARE = 1e-4;
+const MET = "The search ended before its time: the frequencies are met, and the cost falls no more.";
 
 /** @type {{ key: keyof Progress, text: string, sign: Sign, kind: string, dash: number[], width: number }[]} */
 const SERIES = [
@@ -42,6 +43,7 @@ export function makeCost(element, parts) {
   let verdict = null;
   /** Partials of the clips that no mode can have. @type {number[]} */
   let leftOut = [];
+  let isMet = false;
   /** @type {import("uplot") | null} */
   let plot = null;
   let isWaiting = false;
@@ -60,7 +62,8 @@ export function makeCost(element, parts) {
     says,
   );
   const missing = make("p", { class: "hint", hidden: true });
-  element.append(none, judged, missing, body);
+  const met = make("p", { class: "hint", hidden: true }, MET);
+  element.append(none, judged, missing, met, body);
 
   function show() {
     isWaiting = false;
@@ -69,6 +72,7 @@ export function makeCost(element, parts) {
     missing.hidden = leftOut.length === 0;
     const hertz = leftOut.map((each) => each.toFixed(0)).join(", ");
     setText(missing, `No mode of this solid can have the clips' partials at ${hertz} Hz: they are left out.`);
+    met.hidden = !isMet;
     none.hidden = rows.length > 0;
     body.hidden = rows.length === 0;
     const first = rows[0];
@@ -149,6 +153,7 @@ export function makeCost(element, parts) {
     present = header.checked ? header.cost : null;
     verdict = header.verdict ?? null;
     leftOut = header.left_out_hz ?? [];
+    isMet = header.ended_by === "met";
     later();
   });
   connection.onEvent("history", (event) => {
