@@ -140,3 +140,12 @@ def test_nothing_is_overwritten(here, refuses):
 def test_a_mistake_is_answered_in_one_sentence(here, refuses, words, says):
     assert re.search(says, refuses(main, "init", *words))
     assert not (here / "bar.yaml").exists()
+
+
+def test_faults_of_all_clips_are_told_before_any_is_searched(here, capsys, monkeypatch):
+    monkeypatch.setattr("sound.clips.files.extract_file", lambda *_, **__: pytest.fail("searched"))
+    Path("text.wav").write_text("no sound")
+    words = ["--clips", "metal.wav", "text.wav", "gone.wav"]
+    assert main(["init", "bar.yaml", "--mesh", "builtin:bar", *words]) == 2
+    said = capsys.readouterr().err
+    assert "text.wav" in said and "gone.wav" in said and not Path("bar.yaml").exists()

@@ -154,9 +154,19 @@ def _heard(options: InitOptions) -> list[str]:
     from sound.clips.audibility import heard_in_words, heard_partials
     from sound.clips.extraction import remarks
     from sound.clips.files import extract_file
+    from sound.clips.wav import read_wav
 
+    clips = dict.fromkeys(options.clips or ())
+    faults = []
+    for clip in clips:  # all of them, before any is searched
+        try:
+            read_wav(clip, options.allow_clipped)
+        except UserError as error:
+            faults += error.args
+    if faults:
+        raise UserError(*faults)
     lines = []
-    for clip in options.clips or ():
+    for clip in clips:
         sound = extract_file(clip, visible=True, allow_clipped=options.allow_clipped)
         heard = heard_in_words(heard_partials(sound).frequencies)
         lines.append(f"{clip}: {'; '.join([heard, *remarks(sound.evidence)])}")
