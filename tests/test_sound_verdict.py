@@ -87,6 +87,8 @@ def test_partials_that_no_mode_has_are_named():
     )
     verdict = judged(louder, clips_of(louder))
     assert "partials at 4467 Hz" in verdict.reason and "more modes" in verdict.advice
+    faint = with_targets(louder, left_out_share=0.05)
+    assert "more than 40 cents off" in judged(faint, clips_of(faint)).reason
 
 
 def test_a_design_that_rings_on_where_the_clip_is_over_is_no_likeness():

@@ -10,7 +10,7 @@ from sound.clips.extraction import ModalSound
 from sound.design.search import BUDGET, INTERRUPT
 from sound.project.design import Design
 from sound.rendering.better_point import better_point
-from sound.rendering.likeness import LIKE_RATIO, Likeness, furthest_decay
+from sound.rendering.likeness import LIKE_CENTS, LIKE_RATIO, Likeness, furthest_decay
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 
@@ -24,6 +24,8 @@ FAR_CENTS = 50.0
 """Distance of a partial [cents] that is told."""
 MOSTLY = 0.5
 """Share of a clip's energy in what is no mode, beyond which this is told first."""
+MUCH = 0.2
+"""Share of the loudness in partials without a mode, beyond which this is told first."""
 ANOTHER_SOLID = "take another solid"
 
 
@@ -42,7 +44,7 @@ class Judged:
 
 def reason_of(judged: Judged) -> tuple[str, str]:
     """What stands most between a design and its clips, and one suggestion."""
-    for find in (_of_clip, _left_out, _far, _loud, _decay):
+    for find in (_of_clip, _much_left_out, _far, _off, _loud, _decay, _left_out):
         found = find(judged)
         if found is not None:
             return found
@@ -81,11 +83,16 @@ def _of_clip(judged: Judged) -> tuple[str, str] | None:
     )
 
 
-def _left_out(judged: Judged) -> tuple[str, str] | None:
+def _much_left_out(judged: Judged) -> tuple[str, str] | None:
+    """Partials without a mode that are louder than all that are far off."""
     targets = judged.design.targets
-    far = np.abs(judged.cents) > FAR_CENTS
-    missing = targets.left_out
-    if missing is None or targets.left_out_share <= targets.shares[targets.sounding][far].sum():
+    far = targets.shares[targets.sounding][np.abs(judged.cents) > FAR_CENTS].sum()
+    return _left_out(judged) if targets.left_out_share > max(far, MUCH) else None
+
+
+def _left_out(judged: Judged) -> tuple[str, str] | None:
+    missing = judged.design.targets.left_out
+    if missing is None or not len(missing):
         return None
     hertz = ", ".join(f"{each:.0f}" for each in missing)
     return (
@@ -108,6 +115,16 @@ def _far(judged: Judged) -> tuple[str, str] | None:
         f"{len(wrong)} of {partials} partials are more than {FAR_CENTS:.0f} cents off, that at "
         f"{hertz[worst]:.0f} Hz {abs(off[worst]):.0f} cents too {side}",
         _search_on(judged.design) or _without(wrong, partials),
+    )
+
+
+def _off(judged: Judged) -> tuple[str, str] | None:
+    median = float(np.median(np.abs(judged.cents)))
+    if median <= LIKE_CENTS:
+        return None
+    return (
+        f"half of its partials are more than {median:.0f} cents off",
+        _search_on(judged.design) or ANOTHER_SOLID,
     )
 
 
