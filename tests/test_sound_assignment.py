@@ -1,5 +1,7 @@
 """Partials of clips find modes of a solid; modes between them stay silent."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,10 +43,18 @@ def test_modes_that_no_strike_moves_are_passed_over():
     assert (aims.dampings[aims.silent] > 8.0).all()
 
 
-def test_a_pair_of_equal_modes_shares_a_partial():
-    solid = spectrum([100.0, 200.0, 200.0, 400.0])
-    aims = found(targets_of([300.0, 600.0, 1200.0]), solid)
-    np.testing.assert_allclose(aims.frequencies, [300.0, 600.0, 600.0, 1200.0])
+def test_a_pair_of_equal_modes_has_a_partial_for_each_way_in_which_strikes_push_it():
+    hertz, aims = np.array([100.0, 200.0, 200.0, 400.0]), targets_of([300.0, 600.0, 1200.0])
+    one = found(aims, SolidSpectrum(hertz, np.ones((1, 4))))
+    np.testing.assert_array_equal(one.silent, [False, False, True, False])
+    np.testing.assert_allclose(one.frequencies, [300.0, 600.0, 600.0, 1200.0])
+    twice = replace(aims, names=("one", "other"), amplitudes=np.ones((2, 3)))
+    alike = found(twice, SolidSpectrum(hertz, np.ones((2, 4))))
+    np.testing.assert_array_equal(alike.silent, one.silent)
+    across = np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, -1.0, 1.0]])
+    both = found(twice, SolidSpectrum(hertz, across))
+    assert not both.silent.any()
+    np.testing.assert_allclose(both.frequencies, [300.0, 600.0, 600.0, 1200.0])
 
 
 def test_a_quiet_partial_that_no_mode_is_near_is_left_out():

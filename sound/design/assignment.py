@@ -27,6 +27,8 @@ DEEPER = 0.002
 """Cost of each mode, since modes take time."""
 TWIN = 3e-3
 """Relative distance of modes of one frequency, such as the pairs of round solids."""
+PUSHED = 0.1
+"""Least push of another mode of the frequency, over that of the strongest, that takes a partial."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,9 @@ def assigned(targets: Targets, shares: Array, solid: SolidSpectrum) -> Targets:
     """Targets for the modes of a solid that come nearest to some partials; others are silent.
 
     Each of the lowest modes gets a partial or stays silent; partials that none can have are left
-    out.  Modes of one frequency share a partial.  `shares` (N,) are those of the partials in the
-    loudness of the clips.
+    out.  Modes of one frequency share a partial as far as the strikes push them in different ways:
+    one strike pushes one mode of a pair, and the other one is free to go elsewhere.  `shares` (N,)
+    are those of the partials in the loudness of the clips.
     """
     groups = [slice(each.start, each.stop) for each in clusters(solid.hertz**2, 2.0 * TWIN)]
     firsts = [each.start for each in groups]
@@ -54,7 +57,8 @@ def assigned(targets: Targets, shares: Array, solid: SolidSpectrum) -> Targets:
     partial = np.full(count, -1)
     amplitudes = np.zeros((len(targets.names), count))
     for own, group in pairs:
-        partial[groups[group]] = own
+        first = firsts[group]
+        partial[first : first + _pushed_apart(solid.pushed[:, groups[group]])] = own
         amplitudes[:, firsts[group]] = targets.amplitudes[:, own]
     silent = partial < 0
     left_out = np.setdiff1d(np.arange(len(shares)), pairs[:, 0])
@@ -68,6 +72,12 @@ def assigned(targets: Targets, shares: Array, solid: SolidSpectrum) -> Targets:
         left_out=targets.frequencies[left_out],
         left_out_share=float(shares[left_out].sum()),
     )
+
+
+def _pushed_apart(pushed: Array) -> int:
+    """Number of modes of one frequency, by some basis of these, that strikes (T, n) push."""
+    values = np.linalg.svd(pushed, compute_uv=False)
+    return max(1, int((values > PUSHED * values[0]).sum()))
 
 
 def _quick(hertz: Array, dampings: Array) -> Array:
