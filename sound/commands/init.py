@@ -157,7 +157,7 @@ def _heard(options: InitOptions) -> list[str]:
     from sound.clips.wav import read_wav
 
     clips = dict.fromkeys(options.clips or ())
-    faults = []
+    faults: list[str] = []
     for clip in clips:  # all of them, before any is searched
         try:
             read_wav(clip, options.allow_clipped)
