@@ -7,6 +7,8 @@ import pytest
 from scipy.signal import hilbert, welch
 
 from carillon.errors import UserError
+from sound.export.scene_gltf import write_scene_gltf
+from sound.levels import HEARD
 from sound.project.design_file import write_design
 from sound.rendering.render import Hit, render
 from sound.scenes.audible.contact_damping import dashpot
@@ -21,6 +23,7 @@ from sound.scenes.playing.play import perform
 from sound.synthesis.driven import BLOCK, Excitation, ring
 from sound.synthesis.sinusoids import Bank
 from sound.synthesis.sinusoids import ring as ring_bank
+from studio.scene.page import write_scene_page
 from tests.scenes import QUIET, ball, require_engine, scene, struck
 from tests.small_design import small_design
 
@@ -127,6 +130,32 @@ def test_sounds_reach_full_scale_and_not_beyond():
     raw = perform(quiet, visible=False, raw=True)
     assert np.abs(raw.sound).max() > 1.0 and raw.scale == pytest.approx(1e9)
     assert raw.level.fade_seconds == 0.0
+
+
+def test_what_nobody_hears_is_not_amplified(capsys, tmp_path):
+    low = {**BAR, "name": "low", "mesh": "builtin:box", "stands_on": "ground"}
+    high = {**low, "name": "high", "stands_on": "low"}
+    still = perform(scene(low, high, seconds=0.2), 1, visible=False)
+    assert not still.sound.any() and still.scale == 1.0 / HEARD
+    assert still.level is not None and still.level.in_words() == "silent"
+    said = capsys.readouterr().err
+    assert "below the threshold of hearing (2e-05 Pa): the sound is silent; let an obj" in said
+    for gains in (each.gains for each in still.voices if each is not None):
+        assert np.isfinite(gains).all() and gains.any()
+    write_scene_page(tmp_path / "still.html", still)
+    write_scene_gltf(tmp_path / "still.glb", still, True)
+
+
+@pytest.mark.parametrize("decibels_above", [-5.0, -0.1, 0.1, 40.0])
+def test_a_sound_is_amplified_to_full_scale_if_it_is_above_the_threshold(decibels_above):
+    described = scene({**BAR, "position": [0, 0, 0.05]}, seconds=0.2)
+    loud = 1.0 / perform(described, 1, visible=False).scale
+    level = decibels_above - 20.0 * np.log10(0.99 * loud / HEARD)
+    (entry,) = described.objects
+    played = perform(replace(described, objects=(replace(entry, level=level),)), 1, visible=False)
+    peak = np.abs(played.sound).max()
+    assert peak == pytest.approx(0.99 if decibels_above > 0.0 else 0.0)
+    assert 1.0 / played.scale >= HEARD
 
 
 def test_the_end_of_a_scene_fades_where_it_is_cut_off():

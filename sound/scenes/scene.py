@@ -331,7 +331,8 @@ class SoundEntry:
     rate: Annotated[int, between(8000, 192_000)] = option(44_100, "samples per second [Hz]")
     full_scale: Annotated[float, between(1e-12, 1e12)] | Literal["auto"] = option(
         "auto",
-        "sound pressure of full scale [Pa]; auto lets the loudest sample just reach it",
+        "sound pressure of full scale [Pa]; auto lets the loudest sample just reach it, if that is "
+        "not below the threshold of hearing (2e-5 Pa)",
     )
     radiation: bool = option(
         True,

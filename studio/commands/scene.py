@@ -143,9 +143,9 @@ def _write(options: SceneOptions, wav: WavOptions, performance: Performance) -> 
 
 
 def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
-    from math import log10
-
     import numpy as np
+
+    from sound.levels import HEARD, decibels
 
     impacts = performance.impacts
     return {
@@ -172,7 +172,7 @@ def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
         "moved_metres": performance.moved,
         "timings": performance.timings,
         "full_scale_pascal": 1.0 / performance.scale,
-        "full_scale_decibels": 20.0 * log10(1.0 / performance.scale / 2e-5),
+        "full_scale_decibels": decibels(1.0 / performance.scale / HEARD),
         **({} if performance.level is None else performance.level.as_dict()),
     }
 

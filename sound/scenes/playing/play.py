@@ -9,7 +9,7 @@ from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.processes.threads import allowed_threads, blas_threads
-from sound.levels import FULL, SoundLevel, decibels, end_dbfs, faded
+from sound.levels import FULL, HEARD, SoundLevel, decibels, end_dbfs, faded
 from sound.scenes.audible.hearing import Head
 from sound.scenes.audible.loudness import voice
 from sound.scenes.bodies import Body, bodies_of, with_modes
@@ -40,7 +40,8 @@ def perform(
     """Play a scene from its beginning to its end, and show progress if `visible`.
 
     The sound is kept within full scale, and fades where it ends above -60 dBFS, unless it is `raw`:
-    full scale is then what the scene says, 1 Pa for `auto`.
+    full scale is then what the scene says, 1 Pa for `auto`.  With `auto`, a sound that is below the
+    threshold of hearing throughout is silence, which a line tells.
 
     The result is the same, bit for bit, on any number of threads, which is that of the cores if
     None.  Raises UserError if an object is unusable, two overlap at the start, or nothing touches
@@ -80,8 +81,15 @@ def perform(
     )
     sound = player.together(threads)
     clock.lap("sound")
-    scale = _scale(settings.full_scale, float(np.abs(sound).max(initial=0.0)), raw)
+    peak = float(np.abs(sound).max(initial=0.0))
+    scale = _scale(settings.full_scale, peak, raw)
     sound *= scale
+    if settings.full_scale == "auto" and not raw and peak < HEARD:
+        say(
+            f"the loudest sample has {peak:.3g} Pa, below the threshold of hearing ({HEARD:g} Pa): "
+            "the sound is silent; let an object fall, or give one a velocity"
+        )
+        sound[:] = 0.0
     end = end_dbfs(sound, settings.rate)
     sound, fade = faded(sound, settings.rate, 0.0 if raw else None)
     voices = [
@@ -132,10 +140,8 @@ def _scale(full_scale: float | Literal["auto"], peak: float, raw: bool) -> float
     """Full scale per pascal, from the pressure [Pa] of full scale and of the loudest sample."""
     if raw:
         return 1.0 if full_scale == "auto" else 1.0 / full_scale
-    if peak == 0.0:
-        return 1.0
     if full_scale == "auto":
-        return FULL / peak
+        return FULL / peak if peak >= HEARD else 1.0 / HEARD
     if peak > FULL * full_scale:
         say(
             f"the loudest sample has {peak:.3g} Pa, more than full_scale ({full_scale:g} Pa): all "
