@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from sound.scenes.playing.play import perform
-from sound.scenes.scene import Scene, scene_of
+from sound.scenes.scene import Scene
+from sound.scenes.scene_file import scene_of
 
 KINDS = tuple(product(("bowl", "bar", "bell", "plate", "pitcher"), ("glass", "steel")))
 SPACING = 0.36

@@ -8,7 +8,8 @@ import pytest
 from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.contact.engine import Course, GroundPlane, simulate
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact, Touch, split_impacts
-from sound.scenes.scene import Scene, scene_of
+from sound.scenes.scene import Scene
+from sound.scenes.scene_file import scene_of
 
 QUIET = {"radiation": False, "space": False, "contact_damping": False, "noise": False}
 """Sound of modes alone, as they are struck."""

@@ -19,8 +19,8 @@ from sound.scenes.convex import convex_parts, hull_of
 from sound.scenes.cylinder import Cylinder, cylinder_of
 from sound.scenes.divided import parts_of_one
 from sound.scenes.hertz import compliance
+from sound.scenes.object_entry import ObjectEntry
 from sound.scenes.object_solid import ObjectSolid, Sounding, object_solid
-from sound.scenes.scene import ObjectEntry
 from sound.scenes.shape import Shape
 
 LIGHTEST = 1e-9

@@ -24,7 +24,7 @@ from carillon.fem.model import Solid, fine_model
 from carillon.fem.regions import Damping as Coefficients
 from carillon.fem.regions import Regions
 from solver.analysis.solid_surface import SolidSurface
-from sound.scenes.scene import ObjectEntry
+from sound.scenes.object_entry import ObjectEntry
 from sound.scenes.solved import Discretised, SolvedSolid, UnsolvedSolid, kept
 from sound.scenes.touched import touched_material
 

@@ -25,7 +25,7 @@ from sound.project.design_file import read_design
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 from sound.scenes.composed import ComposedObject, losing
-from sound.scenes.scene import ObjectEntry
+from sound.scenes.object_entry import ObjectEntry
 from sound.scenes.solved import Discretised, SolvedSolid, scaled_rigid
 from sound.scenes.touched import touched_in_file, young_near
 from sound.scenes.uniform import DENSITY, UniformSolid, scaled

@@ -15,7 +15,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import CORNER_OFFSETS
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.regions import Regions
-from sound.scenes.scene import ObjectEntry
+from sound.scenes.object_entry import ObjectEntry
 
 
 def touched_material(entry: ObjectEntry, row: Regions, region: RegionEntry) -> NamedMaterial:

@@ -8,7 +8,7 @@ import pytest
 import soundfile
 import yaml
 
-from sound.scenes.scene import scene_of
+from sound.scenes.scene_file import scene_of
 from studies.scene_spectra import scene
 from studies.scene_spectra.results import FOLDER, SceneSpectra
 from studies.scene_spectra.study import SCENE_SPECTRA

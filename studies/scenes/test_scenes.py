@@ -12,7 +12,8 @@ import yaml
 from carillon.composition.materials import MATERIALS, named_material
 from sound.clips.wav import read_wav
 from sound.scenes.performance import COLUMNS
-from sound.scenes.scene import Scene, load_scene
+from sound.scenes.scene import Scene
+from sound.scenes.scene_file import load_scene
 from studies.scenes import tables
 from studies.scenes.config import ScenesSection
 from studies.scenes.examples import (

@@ -97,7 +97,7 @@ def _scene(options: SceneOptions) -> Scene:
         return tune_of(options.notes)
     if options.notes is not None:
         raise UserError(f"--notes goes with {BARS}; found {options.scene}")
-    from sound.scenes.scene import load_scene
+    from sound.scenes.scene_file import load_scene
 
     return load_scene(options.scene)
 

@@ -20,9 +20,10 @@ from sound.scenes.contact.contacts import ContactLog, ContactPoints
 from sound.scenes.contact.standing import stood
 from sound.scenes.contact.start import start
 from sound.scenes.cylinder import Cylinder
+from sound.scenes.object_entry import Vector
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import Motion
-from sound.scenes.scene import EngineEntry, Vector
+from sound.scenes.scene import EngineEntry
 
 PICTURES_PER_SECOND = 120
 """Number of poses of each body that are kept for every second."""

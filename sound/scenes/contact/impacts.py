@@ -21,8 +21,9 @@ from carillon.composition.materials import NamedMaterial
 from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactPoints
 from sound.scenes.hertz import bounce_seconds, compliance
+from sound.scenes.object_entry import Vector
 from sound.scenes.performance import GROUND, Impact
-from sound.scenes.scene import EngineEntry, Vector
+from sound.scenes.scene import EngineEntry
 
 LASTING = 2.5
 """Least duration of a sustained force, in durations of a bounce of the engine."""

@@ -15,9 +15,9 @@ from carillon.command_line.progress import say
 from carillon.errors import UserError
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import SLOWEST
+from sound.scenes.object_entry import Vector
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import GROUND
-from sound.scenes.scene import Vector
 
 OVERLAP = 0.01
 """Greatest depth of an overlap that is separated, over the longest side of the smaller body; a

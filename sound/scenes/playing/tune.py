@@ -6,7 +6,8 @@ from typing import Any
 from carillon.errors import UserError
 from sound.clips.instruments import note_hertz
 from sound.scenes.bodies import body_of
-from sound.scenes.scene import Scene, scene_of
+from sound.scenes.scene import Scene
+from sound.scenes.scene_file import scene_of
 
 MOST_NOTES = 64
 GRAVITY = 9.81
