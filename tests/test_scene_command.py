@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,14 @@ def test_everything_is_written_and_told(folder, capsys):
         line["first"] for line in lines
     }
     assert float(lines[0]["time_seconds"]) == pytest.approx(told["first_impact_seconds"])
+
+
+def test_what_is_sought_is_told_and_what_is_known_is_not(folder, monkeypatch, capsys):
+    monkeypatch.setenv("CARILLON_CACHE", str(folder / "cache"))
+    assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
+    assert re.fullmatch(r"finding 6 modes of 'bar': [\d,]+ unknowns\n", capsys.readouterr().err)
+    assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
+    assert not capsys.readouterr().err
 
 
 def test_the_same_scene_makes_the_same_files(folder, monkeypatch):

@@ -217,7 +217,7 @@ class UnsolvedSolid:
             "resolution": self.how.resolution,
         }
         solve = SolveByOptions(SolverOptions(modes=max(count, FEWEST)))
-        say(f"finding {self.how.count} modes of {self.name!r}", visible=sys.stderr.isatty())
+        say(f"finding {self.how.count} modes of {self.name!r}: {model.n_dofs:,} unknowns")
         with one_thread():
             if covering is None:
                 result = solve(model)

@@ -1,6 +1,5 @@
 """Motion of rigid bodies under gravity by MuJoCo, and the forces at their contacts."""
 
-import sys
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -95,9 +94,7 @@ def simulate(
     recorder = _Recorder(model, data, bodies)
     every = max(1, round(1.0 / (PICTURES_PER_SECOND * engine.step_seconds)))
     steps = every * int(np.ceil(seconds / (every * engine.step_seconds)))
-    for step in track(
-        range(steps), "moving", unit="steps", visible=visible and sys.stderr.isatty()
-    ):
+    for step in track(range(steps), "moving", unit="steps", visible=visible):
         if step % every == 0:
             recorder.take_pose()
         before = data.qvel.copy()

@@ -1,5 +1,6 @@
 """Plays a scene: bodies move, contacts excite their modes, two ears hear them."""
 
+import sys
 import time
 from typing import Literal
 
@@ -49,9 +50,10 @@ def perform(
     """
     threads = threads or allowed_threads()
     seconds, engine, settings = scene.seconds, scene.engine, scene.sound
-    clock = Clock()
+    clock = Clock(visible)
+    clock.begin("bodies")
     bodies = bodies_of(scene.objects)
-    clock.lap("bodies")
+    clock.begin("motion")
     ground = GroundPlane(scene.ground, scene.ground_material)
     course = simulate(bodies, seconds, engine, scene.gravity, ground, visible)
     if not len(course.contacts):
@@ -59,13 +61,13 @@ def perform(
             f"nothing touches anything within {seconds:g} s, so nothing sounds; let the "
             "scene last longer, or let objects meet"
         )
-    clock.lap("motion")
     # After the motion, which tells what is wrong with the scene in a moment.
+    clock.begin("modes")
     bodies = with_modes(bodies)
-    clock.lap("modes")
+    clock.begin("contacts")
     touch = Touch(bodies, ground.material)
     impacts, contacts = split_impacts(course.contacts, touch, engine, scene.gravity)
-    clock.lap("contacts")
+    clock.begin("sound")
     camera = camera_of(scene.camera, bodies, course.motion)
     player = SceneSound(
         bodies,
@@ -80,7 +82,6 @@ def perform(
         round(seconds * settings.rate),
     )
     sound = player.together(threads)
-    clock.lap("sound")
     peak = float(np.abs(sound).max(initial=0.0))
     scale = _scale(settings.full_scale, peak, raw)
     sound *= scale
@@ -92,11 +93,12 @@ def perform(
         sound[:] = 0.0
     end = end_dbfs(sound, settings.rate)
     sound, fade = faded(sound, settings.rate, 0.0 if raw else None)
+    clock.begin("voices")
     voices = [
         None if body.solid is None else voice(body, scale * gains)
         for body, gains in zip(bodies, player.gains)
     ]
-    clock.lap("voices")
+    clock.end()
     surfaces = [
         Appearance.of_regions(
             each.entry.name,
@@ -123,17 +125,26 @@ def perform(
 
 
 class Clock:
-    """Wall time of steps, one after the other."""
+    """Wall time [s] of steps, one after the other; `visible` tells each one on a terminal."""
 
-    def __init__(self) -> None:
+    def __init__(self, visible: bool = False) -> None:
         self.seconds: dict[str, float] = {}
-        self._last = time.perf_counter()
+        self._visible = visible and sys.stderr.isatty()
+        self._step: str | None = None
+        self._begin = 0.0
 
-    def lap(self, step: str) -> None:
-        """Note the time since the last lap as that of a step."""
-        now = time.perf_counter()
-        self.seconds[step] = now - self._last
-        self._last = now
+    def begin(self, step: str) -> None:
+        """End the present step, and begin another one."""
+        self.end()
+        self._step, self._begin = step, time.perf_counter()
+        say(f"{step:<18s}      ...  ", visible=self._visible, end="\r")
+
+    def end(self) -> None:
+        """End the present step, if there is one."""
+        if self._step is not None:
+            elapsed = self.seconds[self._step] = time.perf_counter() - self._begin
+            say(f"{self._step:<18s} {elapsed:8.2f} s", visible=self._visible)
+        self._step = None
 
 
 def _scale(full_scale: float | Literal["auto"], peak: float, raw: bool) -> float:
