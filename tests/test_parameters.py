@@ -141,10 +141,13 @@ def test_a_value_of_a_call_is_checked_as_parameters_are():
         ({"method": False}, "found false, as YAML reads no and off without quotes, expected one"),
         ({"points": 3}, "points: found 3, expected a list: points of the solid"),
         ({"points": [{"at": None}]}, "points[0]: the key name is missing, expected name of the"),
-        ({"points": [{"name": "a", "at": [1, 2]}]}, "points[0].at: found [1, 2], expected 3 of"),
-        ({"points": [{"name": "a", "at": [1, "b", 2]}]}, "points[0].at[1]: found 'b', expected a "),
-        ({"points": [{"name": "nowhere"}]}, "points[0]: nowhere is no point"),
-        ({"points": [{"name": "a", "even": 3}]}, "points[0].even: 3 is odd"),
+        ({"points": [{"name": "a", "at": [1, 2]}]}, "points[0].at (a): found [1, 2], expected 3"),
+        (
+            {"points": [{"name": "a", "at": [1, "b", 2]}]},
+            "points[0].at[1] (a): found 'b', expected",
+        ),
+        ({"points": [{"name": "nowhere"}]}, "points[0] (nowhere): nowhere is no point"),
+        ({"points": [{"name": "a", "even": 3}]}, "points[0].even (a): 3 is odd"),
         ({"weights": 3}, "weights: found 3, expected keys and values: weights of the cost"),
         ({"weights": {"frequenzy": 1}}, "weights: there is no key 'frequenzy', only frequency; "),
         ({"seconds": 0.1}, "seconds: found 0.1, expected at least 0.5 s: wall time [s]"),
@@ -167,7 +170,9 @@ def test_a_document_may_write_whole_numbers_with_a_point():
 def test_a_mistake_in_a_file_is_told_with_its_line(tmp_path):
     file = tmp_path / "solid.yaml"
     file.write_text("resolution: 8\npoints:\n- name: a\n- name: b\n  at: [1, 2, x]\n")
-    with pytest.raises(UserError, match=r"solid.yaml, line 5: points\[1\].at\[2\]: found 'x'"):
+    with pytest.raises(
+        UserError, match=r"solid.yaml, line 5: points\[1\].at\[2\] \(b\): found 'x'"
+    ):
         read_parameters(file, Solid, "a solid")
     file.write_text("density: 8\n\npoints:\n- at: [1, 2, 3]\n")
     with pytest.raises(UserError, match=r"line 1: the key resolution is missing"):

@@ -88,4 +88,4 @@ def test_the_summary_tells_the_distance_and_what_was_moved(folder, capsys):
     assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
     told = capsys.readouterr()
     assert "\nbar: 6 modes from " in told.out and " cents rms, worst +" in told.out
-    assert "object 'marble' by 0.05 mm to [0.3, 0, 0.01]" in told.err
+    assert "object 'marble' from the ground by 0.05 mm to [0.3, 0, 0.01]" in told.err

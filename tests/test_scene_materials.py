@@ -95,6 +95,7 @@ def test_an_unknown_name_is_refused_with_the_known_ones_and_the_closest():
     assert said.endswith("; did you mean aluminium?")
 
 
-def test_a_name_like_no_other_gets_no_guess():
-    with pytest.raises(UserError, match="there is no material 'xyzzy', only [a-z, ]+$"):
-        named_material("xyzzy")
+@pytest.mark.parametrize("name", ["xyzzy", "unobtainium"])
+def test_a_name_like_no_other_gets_no_guess(name):
+    with pytest.raises(UserError, match=f"there is no material '{name}', only [a-z, ]+$"):
+        named_material(name)

@@ -53,7 +53,8 @@ def test_a_ball_stands_within_a_bowl():
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"stands_on": "table"}, "found 'table', expected ground or the name of another object"),
+        ({"stands_on": "table"}, "found 'table', expected one of ground$"),
+        ({"stands_on": "grund"}, r"expected one of ground \(did you mean ground\?\)$"),
         ({"stands_on": "ball"}, "ball on ball: nothing carries them"),
         ({"stands_on": "ground", "position": [0, 0, 1]}, "whose z is 1, expected 0"),
     ],
@@ -61,6 +62,15 @@ def test_a_ball_stands_within_a_bowl():
 def test_what_stands_on_nothing_is_refused(given, says):
     with pytest.raises(UserError, match=says):
         scene(ball(**given))
+
+
+def test_a_mistake_is_told_with_the_name_of_its_object():
+    with pytest.raises(UserError, match=r"^objects\[1\].radius \(marble\): found -1"):
+        scene(ball(), ball("marble", radius=-1.0))
+    with pytest.raises(UserError, match=r"^objects\[1\] \(marble\): there is no key 'raduis'"):
+        scene(ball(), ball("marble", raduis=1.0))
+    with pytest.raises(UserError, match=r"^objects\[1\].name: several objects are named 'ball'"):
+        scene(ball(), ball())
 
 
 def test_what_does_not_meet_its_support_or_has_no_ground_is_refused():

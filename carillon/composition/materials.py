@@ -1,6 +1,5 @@
 """Materials by name: elasticity, damping, contact and looks."""
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from carillon.errors import UserError
 from carillon.fem.elasticity import orthotropic_matrix
 from carillon.fem.regions import Regions
 from carillon.files.yaml_input import read_own_yaml
+from carillon.parameters.sentences import alike
 
 Triple = tuple[float, float, float]
 
@@ -78,8 +78,8 @@ def named_material(name: str) -> NamedMaterial:
     200000000000.0
     """
     if not isinstance(name, str) or name not in _TABLE:
-        close = difflib.get_close_matches(str(name), MATERIALS, n=1)
-        hint = f"; did you mean {close[0]}?" if close else ""
+        meant = alike(str(name), MATERIALS)
+        hint = f"; did you mean {meant}?" if meant else ""
         raise UserError(f"there is no material {name!r}, only {', '.join(MATERIALS)}{hint}")
     return _TABLE[name]
 

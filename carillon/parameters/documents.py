@@ -51,7 +51,10 @@ def parameters_from(document: Mapping[str, Any], model: type[T]) -> T:
     try:
         made: T = adapter(model).validate_json(text, strict=True)  # type: ignore[arg-type]
     except ValidationError as error:
-        raise mistake_of(error, ValueDomain(model), in_yaml=True) from None
+        mistake = mistake_of(error, ValueDomain(model), in_yaml=True)
+        raise mistake.named_in(document) from None
+    except ParameterError as error:
+        raise error.named_in(document) from None
     return made
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -79,11 +79,23 @@ class ParameterError(UserError):
         What the parameter is.
     """
 
-    def __init__(self, place: Place, reason: str, meaning: str = "") -> None:
-        super().__init__(": ".join(part for part in (in_words(place), reason, meaning) if part))
-        self.place = place
+    def __init__(
+        self, place: Place, reason: str, meaning: str = "", names: Sequence[str] = ()
+    ) -> None:
+        where = in_words(place) + (f" ({', '.join(names)})" if names else "")
+        super().__init__(": ".join(part for part in (where, reason, meaning) if part))
+        self.place = self._told = place
         self.reason = reason
         self.meaning = meaning
+
+    def named_in(self, document: Any) -> ParameterError:
+        """The same, with the names that items of lists have in the document; see `names_along`."""
+        if self.place[-1:] == ("name",):  # The reason tells it.
+            return self
+        names = names_along(document, self.place)
+        named = ParameterError(self._told, self.reason, self.meaning, names)
+        named.place = self.place
+        return named
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Ranks and processes send the sentence.
@@ -133,6 +145,26 @@ def in_words(place: Iterable[str | int]) -> str:
     """
     parts = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in place]
     return "".join(parts).removeprefix(".")
+
+
+def names_along(document: Any, place: Iterable[str | int]) -> list[str]:
+    """Names of the items of lists along a place in a document, the outermost one first.
+
+    Examples
+    --------
+    >>> names_along({"objects": [{"name": "bowl", "radius": -1}]}, ("objects", 0, "radius"))
+    ['bowl']
+    """
+    names = []
+    for part in place:
+        try:
+            document = document[part]
+        except (LookupError, TypeError):
+            break
+        if isinstance(part, int) and isinstance(document, Mapping):
+            name = document.get("name")
+            names += [name] if isinstance(name, str) and name else []
+    return names
 
 
 def _followed(

@@ -6,11 +6,13 @@ from typing import Annotated, Literal
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.parameters import REQUIRED, Check, Within, option, parameters
 from carillon.parameters.quantities import between
-from carillon.parameters.sentences import ParameterError
+from carillon.parameters.sentences import ParameterError, did_you_mean
 from sound.scenes.object_entry import FILES, Coordinate, Material, ObjectEntry, Vector
 
 GROUND_NAME = "ground"
 """What lists and scenes call the floor."""
+LISTED = 10
+"""Greatest number of objects that a message lists."""
 
 
 def _in_time(path: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
@@ -142,9 +144,12 @@ class Scene:
             if support == GROUND_NAME and self.ground is None:
                 raise ParameterError(path, "there is no ground; give the ground a height")
             if support not in (None, GROUND_NAME, *below):
+                others = [each for each in below if each != name]
+                meant = did_you_mean(str(support), [GROUND_NAME, *others])
+                listed = ", ".join([GROUND_NAME, *others[:LISTED]])
+                rest = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
                 raise ParameterError(
-                    path,
-                    f"found {support!r}, expected {GROUND_NAME} or the name of another object",
+                    path, f"found {support!r}, expected one of {listed}{rest}{meant}"
                 )
             chain = [name]
             while support in below:

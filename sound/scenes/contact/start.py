@@ -5,7 +5,7 @@ speed of pi d / T, where T is the duration of a bounce: a millimetre makes a bow
 itself.  Depths are those of the convex parts, which may stand out of the visible surface.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
+from carillon.fem.geometry.size import length_in_words
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import SLOWEST
 from sound.scenes.object_entry import Vector
@@ -55,10 +56,14 @@ def start(
     """
     _forward(data)
     _set_velocities(data, bodies)
-    moved = _separated(data, bodies, gravity, contact_seconds)
+    moved: dict[int, Array] = {}
+    from_others: dict[int, dict[int, None]] = {}
+    for number, other, way in _separated(data, bodies, gravity, contact_seconds):
+        moved[number] = moved.get(number, np.zeros(3)) + way
+        from_others.setdefault(number, {})[other] = None
     _forward(data)
     if moved:
-        say(_in_words(moved, data, bodies))
+        say(_in_words(moved, from_others, data, bodies))
     return moved
 
 
@@ -78,28 +83,32 @@ def _set_velocities(data: Any, bodies: Sequence[Body]) -> None:
 
 def _separated(
     data: Any, bodies: Sequence[Body], gravity: Vector, contact_seconds: float
-) -> dict[int, Array]:
-    moved: dict[int, Array] = {}
+) -> Iterator[tuple[int, int, Array]]:
+    """Separate bodies: the number of each that is moved, that of the one it is moved from, and its
+    way (3,) [m]."""
+    first = True
     # Depth that is left: that of a body at rest under gravity, or of an impact that is not heard.
     bounce = contact_seconds / np.pi
     least = max(float(np.linalg.norm(gravity)) * bounce, SLOWEST) * bounce
     for _ in range(ROUNDS):
         overlaps = [each for each in _overlaps(data) if each.depth > least]
         if not overlaps:
-            return moved
-        if not moved:
+            return
+        if first:
+            first = False
             least *= CLEAR
             _require_shallow(data, overlaps, bodies, least)
         for each in overlaps:
-            for number, way in zip(each.pair, _ways(each, gravity, bodies)):
+            others = reversed(each.pair)
+            for number, other, way in zip(each.pair, others, _ways(each, gravity, bodies)):
                 if way.any():
-                    moved[number] = moved.get(number, np.zeros(3)) + way
                     _move(data, number, way)
+                    yield number, other, way
         _forward(data)
     names = " and ".join(_name(number, bodies) for number in overlaps[0].pair)
     raise UserError(
-        f"{names} overlap by {1e3 * overlaps[0].depth:.3g} mm at the start and are too closely "
-        "packed to be moved apart; give them more room"
+        f"{names} overlap by {length_in_words(overlaps[0].depth)} at the start and are too "
+        "closely packed to be moved apart; give them more room"
     )
 
 
@@ -130,7 +139,7 @@ def _require_shallow(
     if excess(worst) <= 1.0:
         return
     names = " and ".join(_name(number, bodies) for number in worst.pair)
-    start = f"{names} overlap by {1e3 * worst.depth:.3g} mm at the start"
+    start = f"{names} overlap by {length_in_words(worst.depth)} at the start"
     first, second = worst.pair
     free = second if bodies[first].entry.fixed else first
     begin = data.xpos[free + 1].copy()
@@ -190,12 +199,19 @@ def _rounded(value: float, direction: float) -> str:
     return f"{hundredths / 1e5:.7g}"
 
 
-def _in_words(moved: dict[int, Array], data: Any, bodies: Sequence[Body]) -> str:
+def _in_words(
+    moved: dict[int, Array],
+    from_others: dict[int, dict[int, None]],
+    data: Any,
+    bodies: Sequence[Body],
+) -> str:
     parts = []
     for number, way in sorted(moved.items())[:NAMED]:
         place = ", ".join(f"{x:.5g}" for x in data.xpos[number + 1])
+        others = " and ".join(_name(other, bodies) for other in from_others[number])
         parts.append(
-            f"{_name(number, bodies)} by {1e3 * float(np.linalg.norm(way)):.3g} mm to [{place}]"
+            f"{_name(number, bodies)} from {others} by "
+            f"{length_in_words(float(np.linalg.norm(way)))} to [{place}]"
         )
-    rest = f" and {len(moved) - NAMED} more" if len(moved) > NAMED else ""
+    rest = f", and {len(moved) - NAMED} more" if len(moved) > NAMED else ""
     return f"what overlaps at the start is moved apart: {', '.join(parts)}{rest}"
