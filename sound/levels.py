@@ -12,6 +12,8 @@ FULL = 0.99
 """Largest magnitude of a sound that is kept within full scale; rounding does not take it to 1."""
 HEARD = 2e-5
 """Threshold of hearing at 1 kHz [Pa], 0 dB of sound pressure (ISO 389)."""
+HIGHEST_HEARD = 20_000.0
+"""Highest frequency that is heard [Hz]."""
 BLOCK_SECONDS = 0.4
 """Length of a gating block of ITU-R BS.1770 [s]."""
 LOWEST_METER_RATE = 8_000

@@ -82,6 +82,25 @@ def test_a_tune_strikes_its_bars_in_turn_in_time_and_in_tune():
     assert np.log2(np.array(hertz) / 440.0) * 12 == pytest.approx([27, 31, 34], abs=0.01)
 
 
+def test_the_summary_tells_what_moves_at_the_end_and_what_nobody_hears(folder, capsys):
+    marble = "radius: 0.01, material: glass, count: 6, resolution: 12, stands_on: ground"
+    end = f"  - {{name: rolling, {marble}, position: [0, 0.3, 0], velocity: [0.5, 0, 0]}}\n"
+    described = f"seconds: 0.5\nobjects:\n  - {{name: lying, {marble}}}\n{end}"
+    (folder / "scene.yaml").write_text(described)
+    assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"^lying, rolling: 6 modes from 1\d\d,.* Hz, which nobody hears, ", told, re.M)
+    assert re.search(r"^rolling \(0\.\d+ m/s\) still moves at the end$", told, re.M)
+    assert main(["scene", "scene.yaml", "--out", "s.wav", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["above_hearing"] == ["lying", "rolling"]
+    assert 0.1 < told["moving_at_end_metres_per_second"].pop("rolling") < 1.1
+    assert not told["moving_at_end_metres_per_second"]
+    (folder / "scene.yaml").write_text(described.replace(end, ""))
+    assert main(["scene", "scene.yaml", "--out", "s.wav"]) == 0
+    assert capsys.readouterr().out.endswith("\nall objects rest at the end\n")
+
+
 def test_the_summary_tells_the_distance_and_what_was_moved(folder, capsys):
     described = SCENE.replace("0.02, 0, 0.2]", "0.3, 0, 0.00995]").replace("0.6", "0.2")
     (folder / "scene.yaml").write_text(described)

@@ -121,6 +121,35 @@ class Picture:
     ground: float | None
     camera: Camera
 
+    def end_speeds(self) -> dict[str, float]:
+        """Speed [m/s] of the fastest vertex of each object at the end of the motion, by name.
+
+        Examples
+        --------
+        >>> ends = np.array([[[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.5]]])
+        >>> still = np.array([[[1.0, 0.0, 0.0, 0.0]]] * 2)
+        >>> motion = Motion(np.array([0.0, 0.5]), ends, still)
+        >>> box = Appearance("box", np.eye(3), np.array([[0, 1, 2]]), (1.0, 1.0, 1.0))
+        >>> Picture([box], motion, None, Camera((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))).end_speeds()
+        {'box': 1.0}
+        """
+        from scipy.spatial.transform import Rotation
+
+        motion = self.motion
+        if len(motion.times) < 2:
+            return {}
+        seconds = motion.times[-1] - motion.times[-2]
+        speeds = {}
+        for number, each in enumerate(self.objects):
+            turns = Rotation.from_quat(motion.rotations[-2:, number][:, [1, 2, 3, 0]])
+            before, after = (
+                turn.apply(each.vertices) + place
+                for turn, place in zip(turns, motion.positions[-2:, number])
+            )
+            fastest = np.linalg.norm(after - before, axis=1).max()
+            speeds[each.name] = float(fastest / seconds)
+        return speeds
+
 
 class Impact(NamedTuple):
     """An impact of a pair of bodies by numbers, of which the ground, `GROUND`, is always the

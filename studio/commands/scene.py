@@ -30,6 +30,8 @@ EXAMPLES = """examples:
 BARS = "builtin:bars"
 NAMED = 3
 """Greatest number of objects that a line names."""
+SLOWEST = 1e-3
+"""Speed [m/s] below which an object rests."""
 OUTPUTS = {
     "out": (".wav",),
     "video": (".mp4", ".webm"),
@@ -85,6 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(summary))
     else:
         print(_sentence(summary, performance.level), *_pitches(performance), sep="\n")
+        print(_end(summary["moving_at_end_metres_per_second"]))
     return 0
 
 
@@ -145,9 +148,14 @@ def _write(options: SceneOptions, wav: WavOptions, performance: Performance) -> 
 def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
     import numpy as np
 
-    from sound.levels import HEARD, decibels
+    from sound.levels import HEARD, HIGHEST_HEARD, decibels
 
     impacts = performance.impacts
+    lowest = {
+        each.name: float(voice.frequencies.min())
+        for each, voice in zip(performance.picture.objects, performance.voices)
+        if voice is not None and len(voice.frequencies)
+    }
     return {
         "files": {name: getattr(options, name) for name in OUTPUTS},
         "seconds": len(performance.sound) / performance.rate,
@@ -164,10 +172,12 @@ def _summary(options: SceneOptions, performance: Performance) -> dict[str, Any]:
             (float((each.impulse**2).sum() ** 0.5) for each in impacts), default=None
         ),
         "accuracy": _accuracies(performance),
-        "lowest_hz": {
-            each.name: float(voice.frequencies.min())
-            for each, voice in zip(performance.picture.objects, performance.voices)
-            if voice is not None and len(voice.frequencies)
+        "lowest_hz": lowest,
+        "above_hearing": [name for name, hertz in lowest.items() if hertz > HIGHEST_HEARD],
+        "moving_at_end_metres_per_second": {
+            name: speed
+            for name, speed in performance.picture.end_speeds().items()
+            if speed >= SLOWEST
         },
         "moved_metres": performance.moved,
         "timings": performance.timings,
@@ -193,6 +203,7 @@ def _accuracies(performance: Performance) -> dict[str, dict[str, Any] | None]:
 
 def _pitches(performance: Performance) -> list[str]:
     """A line for each object that sounds; those that sound alike share one."""
+    from sound.levels import HIGHEST_HEARD
     from sound.scenes.expected_cents import told
 
     accuracies = performance.accuracies or [None] * len(performance.voices)
@@ -200,9 +211,20 @@ def _pitches(performance: Performance) -> list[str]:
     for each, accuracy, voice in zip(performance.picture.objects, accuracies, performance.voices):
         if voice is not None and len(voice.frequencies):
             lowest = float(voice.frequencies.min())
-            line = f"{len(voice.frequencies)} modes from {lowest:,.1f} Hz, {told(accuracy)}"
+            unheard = ", which nobody hears" if lowest > HIGHEST_HEARD else ""
+            span = f"{len(voice.frequencies)} modes from {lowest:,.1f} Hz{unheard}"
+            line = f"{span}, {told(accuracy)}"
             names.setdefault(line, []).append(each.name)
     return [f"{_listed(alike)}: {line}" for line, alike in names.items()]
+
+
+def _end(speeds: dict[str, float]) -> str:
+    """Whether objects still move at the end, and how fast [m/s]."""
+    if not speeds:
+        return "all objects rest at the end"
+    fastest = sorted(speeds, key=lambda name: -speeds[name])
+    told = _listed([f"{name} ({speeds[name]:.2g} m/s)" for name in fastest])
+    return f"{told} still {'moves' if len(speeds) == 1 else 'move'} at the end"
 
 
 def _listed(names: list[str]) -> str:
