@@ -209,7 +209,8 @@ def test_a_scene_tells_all_doubts_by_the_keys_that_mend_them(tmp_path, caplog):
     for regions in ({}, {"regions": [{"name": "all", "material": "steel"}]}):
         warn_once.cache_clear()
         bodies_of(scene(objects=[entry | regions]).objects)
-        unit, filled, up = hints(caplog)
+        unit, up, filled = hints(caplog)
+        assert f"object 'board': {mesh}: it is 400 m" in unit
         assert "(unit: mm) it is 40 cm" in unit and "give wall: 5m," in filled
         assert "up: y stands it up" in up and "--" not in unit + filled + up
     warn_once.cache_clear()
@@ -242,7 +243,7 @@ def test_init_tells_size_and_all_doubts_and_writes_what_mends_them(tmp_path, cap
     trimesh.Trimesh(large.vertices, large.faces[1:], process=False).export(mesh)
     assert sound(["init", str(file), "--mesh", str(mesh)]) == 0
     assert "400 x 20 x 100 m" in capsys.readouterr().out
-    unit, filled, up = hints(caplog)
+    unit, up, filled = hints(caplog)
     assert "--unit mm) it is 40 cm" in unit and "is filled" in filled and "--up y" in up
     file.unlink()
     mended = ["--unit", "mm", "--up", "y", "--wall", "2 mm"]

@@ -110,6 +110,7 @@ def _say_hints(entry: ObjectEntry, mesh: str, solid: ObjectSolid) -> None:
     surface = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
     is_wall = entry.wall is not None
     hints = MeshHints.of(mesh, surface, entry.unit, entry.mesh_up, is_wall)
+    hints = replace(hints, owner=entry.name)
     if entry.size is not None or entry.pitch is not None:
         hints = replace(hints, units={})
     hints.say(for_file=True)

@@ -35,6 +35,8 @@ class MeshHints:
     """Axis that seems to point up, while z does; None if none does."""
     shell: float | None
     """Thickness [m] that a shell might have, of an open surface that is filled; None of others."""
+    owner: str = ""
+    """Object of a scene that it is the mesh of; empty if it is of none."""
 
     @classmethod
     def of(
@@ -75,8 +77,25 @@ class MeshHints:
 
         What mends it is an option of commands, or `for_file` a key of a project or scene.
         """
+        self._say_size(for_file)
+        self._say_filling(for_file)
+
+    def say(self, for_file: bool = False) -> None:
+        """Log all hints, each once, see `say_size_and_filling`: what changes most goes first."""
+        self._say_size(for_file)
+        if self.up is not None:
+            self._say(
+                f"seems to stand on {self.up} = 0 and to lie on its side, since z points up here; "
+                f"--up {self.up} stands it up",
+                for_file,
+            )
+        self._say_filling(for_file)
+
+    def _say_size(self, for_file: bool) -> None:
         if self.units and (hint := unit_hint(self.extents, self.unit)):
             self._say(hint, for_file)
+
+    def _say_filling(self, for_file: bool) -> None:
         if self.shell is not None:
             thickness = lengths_in_words([self.shell]).replace(" ", "")
             self._say(
@@ -86,18 +105,9 @@ class MeshHints:
                 for_file,
             )
 
-    def say(self, for_file: bool = False) -> None:
-        """Log all hints, each once, see `say_size_and_filling`."""
-        self.say_size_and_filling(for_file)
-        if self.up is not None:
-            self._say(
-                f"seems to stand on {self.up} = 0 and to lie on its side, since z points up here; "
-                f"--up {self.up} stands it up",
-                for_file,
-            )
-
     def _say(self, hint: str, for_file: bool) -> None:
-        warn_once(f"{self.mesh}: {in_keys(hint) if for_file else hint}")
+        owner = f"object {self.owner!r}: " if self.owner else ""
+        warn_once(f"{owner}{self.mesh}: {in_keys(hint) if for_file else hint}")
 
 
 def is_open(surface: Surface) -> bool:
