@@ -164,6 +164,100 @@ def test_a_folder_is_filled_again_beside_what_others_keep_there(folder, tmp_path
     assert not [each for each in path.iterdir() if each.name.startswith(STAGING)]
 
 
+def names_in(folder: Path) -> set[str]:
+    files = (each for each in folder.rglob("*") if not each.is_dir())
+    return {each.relative_to(folder).as_posix() for each in files}
+
+
+def exported(folder: Path, design: str, path: Path, *words: str) -> int:
+    return main(["export", str(folder / design), "--out", f"{path}/", *words])
+
+
+def test_files_of_a_former_export_make_room_and_others_stay(folder, tmp_path, capsys):
+    path, shorter = tmp_path / "pan", ["--strengths", "1", "--variations", "1", "--rate", "22050"]
+    assert exported(folder, "pan.h5", path, *FEW, "--points", "1") == 0
+    own = {"pan_corner_s1_v1.wav", "sounds/pan_side_s1_v1.wav.import", "sounds/own.wav", "own.js"}
+    for name in own:
+        (path / name).write_text("of others")
+    capsys.readouterr()
+    shutil.copy(folder / "pan.h5", tmp_path / "pot.h5")
+    assert exported(tmp_path, "pot.h5", path, *shorter) == 0
+    told = json.loads((path / "sounds.json").read_text())
+    assert names_in(path) == own | set(told["files"])
+    assert [row["file"] for row in told["sounds"]] == [f"pot_{point}_s1_v1.wav" for point in POINTS]
+    # 12 sounds, and 5 models beside one for each of 3 points.
+    assert "; 20 files of a former export removed" in capsys.readouterr().out
+
+
+HOSTILE = [
+    "../outside.js",
+    "sounds/../../outside.js",
+    "link/outside.js",
+    "sounds/link.wav",
+    "own.txt",
+    7,
+    None,
+]
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        b"{",
+        b"[]",
+        b"\xff",
+        b"[" * 100_000,
+        json.dumps({"format": "of others", "files": ["own.js"]}).encode(),
+        json.dumps({"format": "carillon sound set 1", "files": 3}).encode(),
+        "hostile",
+    ],
+)
+def test_tables_that_no_export_wrote_remove_nothing(folder, tmp_path, table):
+    path, outside = tmp_path / "pan", tmp_path / "outside.js"
+    (path / "sounds").mkdir(parents=True)
+    kept = {path / "own.js", path / "own.txt", outside}
+    for file in kept:
+        file.write_text("of others")
+    (path / "link").symlink_to(tmp_path)
+    (path / "sounds/link.wav").symlink_to(outside)
+    if table == "hostile":
+        files = [str(outside), *HOSTILE]
+        table = json.dumps({"format": "carillon sound set 1", "files": files}).encode()
+    (path / "sounds.json").write_bytes(table)
+    assert exported(folder, "pan.h5", path, *FEW) == 0
+    assert all(file.read_text() == "of others" for file in kept)
+    assert (path / "sounds/link.wav").is_symlink() and (path / "link").is_symlink()
+    assert set(SOUNDS) <= {each.name for each in (path / "sounds").iterdir()}
+
+
+@pytest.mark.parametrize("failing", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_an_export_that_ends_early_leaves_the_former_one(folder, tmp_path, monkeypatch, failing):
+    path = tmp_path / "pan"
+    assert exported(folder, "pan.h5", path, *FEW) == 0
+    before = {name: (path / name).read_bytes() for name in names_in(path)}
+
+    def fails(*_):
+        raise failing
+
+    monkeypatch.setattr("sound.export.engine_folder.levels_csv", fails)
+    status = exported(folder, "pan.h5", path, "--strengths", "1", "--variations", "1")
+    assert status == (130 if isinstance(failing, KeyboardInterrupt) else 2)
+    assert {name: (path / name).read_bytes() for name in names_in(path)} == before
+
+
+@pytest.mark.parametrize("name", ["pan.glb", "sounds/pan_side_s1_v1.wav", "sounds.csv", "sounds"])
+def test_a_folder_or_link_in_the_place_of_a_file_is_told(folder, tmp_path, name, refuses):
+    path = tmp_path / "pan"
+    assert exported(folder, "pan.h5", path, *FEW, "--points", "1") == 0
+    taken = path / name
+    shutil.rmtree(taken) if taken.is_dir() else taken.unlink()
+    taken.symlink_to(tmp_path) if name == "sounds" else taken.mkdir()
+    before = names_in(path)
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{path}/", *FEW)
+    assert f"{taken}: is a {'link' if name == 'sounds' else 'folder'}" in said
+    assert names_in(path) == before
+
+
 def test_a_folder_that_fails_leaves_nothing(folder, tmp_path, monkeypatch, refuses):
     def full(*_):
         raise OSError(28, "No space left on device")

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from carillon.command_line.counts import counted
 from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from sound.commands.common_options import DampingOptions
@@ -89,25 +90,30 @@ def _write_folder(
 ) -> dict[str, Any]:
     from dataclasses import asdict
 
-    from sound.export.engine_folder import write_engine_folder
+    from sound.export.engine_folder import TABLES, write_engine_folder
 
     name = Path(options.design).stem
     written = write_engine_folder(options.out, design, sounds, settings, name)
     size = sum((Path(options.out) / file).stat().st_size for file in written.files)
     points = len({level.point for level in written.levels})
+    models = len(written.files) - len(written.levels) - len(TABLES)
+    sentence = (
+        f"{options.out}: {counted(len(written.levels), 'sound')} of {counted(points, 'point')}, "
+        f"{counted(len(sounds.strengths), 'strength')} and "
+        f"{counted(sounds.variations, 'variation')}, 24 bits at {sounds.rate:,} Hz; levels in "
+        f"sounds.csv and sounds.json; {counted(models, 'model')}; {size:,} bytes"
+    )
+    if written.removed:
+        sentence += f"; {counted(len(written.removed), 'file')} of a former export removed"
     return {
         "out": options.out,
         "format": FOLDER,
         "bytes": size,
         "files": written.files,
         "missing": written.missing,
+        "removed": written.removed,
         "sounds": [asdict(level) for level in written.levels],
-        "sentence": (
-            f"{options.out}: {len(written.levels)} sounds of {points} points, "
-            f"{len(sounds.strengths)} strengths and {sounds.variations} variations, 24 bits at "
-            f"{sounds.rate:,} Hz; levels in sounds.csv and sounds.json; "
-            f"{len(written.files) - len(written.levels) - 3} models; {size:,} bytes"
-        ),
+        "sentence": sentence,
     }
 
 
@@ -123,4 +129,4 @@ def _content(kind: str, design: Design) -> str:
             return f"{text}--regions: factors on those of the regions, times 1 GPa"
         return f"{text}--density {model.density:.6g} --poisson {model.poisson:.6g}"
     hertz = design.frequencies
-    return f"{len(hertz)} modes, {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"
+    return f"{counted(len(hertz), 'mode')}, {hertz[0]:.4g} to {hertz[-1]:.4g} Hz"

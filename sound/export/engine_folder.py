@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -19,27 +19,32 @@ from sound.export.gltf import write_gltf
 from sound.export.level_table import LevelRow, levels_csv, levels_json, with_gains
 from sound.export.modal_model import ModalModel
 from sound.export.modal_table import impact_objects, write_modal_csv, write_modal_json
+from sound.export.placing import SOUNDS, TABLE, place, require_places
 from sound.export.sound_set import file_names, rendered_set, require_count
 from sound.export.sound_set_options import SoundSetOptions
 from sound.export.web_audio import web_audio_module
 from sound.export.wwise import wwise_import
 from sound.project.design import Design
 
-SOUNDS = "sounds"
-"""Name of the folder of sounds, and of the tables beside it."""
 WWISE = f"{SOUNDS}-wwise.txt"
 """Name of the list that Wwise imports."""
+TABLES = (WWISE, f"{SOUNDS}.csv", TABLE)
+"""Names of the tables of sounds."""
 STAGING = ".carillon-export-"
 """Beginning of the name of the folder in which all is written before it gets its place."""
 
 
 @dataclass(frozen=True)
 class WrittenFolder:
-    """What was written: names of files in the folder, levels of the sounds, and what is missing."""
+    """What was written: names of files in the folder, levels of the sounds, and what is missing.
+
+    `removed` are those of a former export that this one has not written again.
+    """
 
     files: list[str]
     levels: list[LevelRow]
     missing: list[str] = field(default_factory=list)
+    removed: list[str] = field(default_factory=list)
 
 
 def require_folder(path: str | Path) -> Path:
@@ -68,9 +73,10 @@ def write_engine_folder(
 ) -> WrittenFolder:
     """Fill a folder, made if it is missing: sounds, their levels, glTF, Faust, Web Audio, tables.
 
-    Files of the same names are replaced, once all are written; others stay, as game engines keep
-    their own beside them.  A model that fails does not take the sounds along: a line of progress
-    says why.  Raises UserError if the sounds are too many or the folder cannot be written.
+    Once all are written, files of a former export, which its `sounds.json` lists, are removed or
+    replaced; others stay, as game engines keep their own beside them.  A model that fails does not
+    take the sounds along: a line of progress says why.  Raises UserError if the sounds are too many
+    or the folder cannot be written, and leaves the folder as it is then.
     """
     settings = settings or ExportSettings()
     model = ModalModel.of_design(design, settings.points, name)
@@ -82,19 +88,17 @@ def write_engine_folder(
         folder = HeldFolder(path)
         try:
             folder.remove_passing(STAGING)
+            require_places(folder, TABLES)
             with folder.passing(STAGING) as staged:
                 written = _write_all(staged, design, model, options, settings)
-                for file in written.files:
-                    target = path / file
-                    target.parent.mkdir(exist_ok=True)
-                    os.replace(staged / file, target)
+                removed = place(folder, staged, written.files)
         finally:
             folder.close()
             if is_new and not any(path.iterdir()):
                 path.rmdir()
     except OSError as error:
         raise UserError(f"{path}: could not be written ({cause(error)})") from error
-    return written
+    return replace(written, removed=removed)
 
 
 def _write_all(
@@ -122,12 +126,10 @@ def _write_all(
     levels = with_gains(made)
     (folder / WWISE).write_text(wwise_import(levels, SOUNDS))
     (folder / f"{SOUNDS}.csv").write_text(levels_csv(levels))
-    text = levels_json(model.name, levels, options.rate, options.seed)
-    (folder / f"{SOUNDS}.json").write_text(text)
-    sounds = [f"{SOUNDS}/{level.file}" for level in levels]
-    return WrittenFolder(
-        [*sounds, *files, WWISE, f"{SOUNDS}.csv", f"{SOUNDS}.json"], levels, missing
-    )
+    all_files = [*(f"{SOUNDS}/{level.file}" for level in levels), *files, *TABLES]
+    text = levels_json(model.name, levels, options.rate, options.seed, all_files)
+    (folder / TABLE).write_text(text)
+    return WrittenFolder(all_files, levels, missing)
 
 
 def _models(

@@ -17,7 +17,7 @@ from sound.export.modal_model import ModalModel, plain
 
 _TEMPLATE = Template("""\
 declare name "$name";
-declare description "Modes of a solid, struck at one of $n_positions points";
+declare description "Modes of a solid, struck at $struck";
 declare author "Carillon $version";
 import("stdfaust.lib");
 
@@ -87,6 +87,7 @@ def faust_program(model: ModalModel) -> str:
         "points": "\n".join(listed),
         "n_modes": len(model.frequencies),
         "n_positions": len(names),
+        "struck": "its point" if len(names) == 1 else f"one of {len(names):,} points",
         "frequencies": _numbers(model.frequencies),
         "t60s": _numbers(model.decay_times),
         "amplitudes": _numbers(model.amplitudes.ravel()),

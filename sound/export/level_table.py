@@ -11,6 +11,7 @@ from typing import Any
 
 from carillon import __version__
 from sound.export.mastering import PEAK_DECIBELS
+from sound.export.placing import FORMAT
 from sound.levels import decibels
 
 COLUMNS = {
@@ -75,10 +76,15 @@ def levels_csv(levels: Sequence[LevelRow]) -> str:
     return content.getvalue()
 
 
-def levels_json(name: str, levels: Sequence[LevelRow], rate: int, seed: int) -> str:
-    """The table of levels as JSON, with the sampling rate [Hz] and the seed of the variations."""
+def levels_json(
+    name: str, levels: Sequence[LevelRow], rate: int, seed: int, files: Sequence[str] = ()
+) -> str:
+    """The table of levels as JSON, with the sampling rate [Hz] and the seed of the variations.
+
+    `files`: all that the export writes, which a later one into the same folder removes.
+    """
     content: dict[str, Any] = {
-        "format": "carillon sound set 1",
+        "format": FORMAT,
         "generator": f"Carillon {__version__}",
         "name": name,
         "peak_db": PEAK_DECIBELS,
@@ -87,6 +93,7 @@ def levels_json(name: str, levels: Sequence[LevelRow], rate: int, seed: int) -> 
         "seed": seed,
         "columns": COLUMNS,
         "sounds": [asdict(level) for level in levels],
+        "files": list(files),
     }
     return json.dumps(content, indent=1)
 

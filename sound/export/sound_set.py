@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from sound.clips.wav import as_wav
 from sound.export.level_table import LevelRow, level_of
@@ -53,8 +54,9 @@ def require_count(points: int, options: SoundSetOptions) -> None:
     count = points * len(options.strengths) * options.variations
     if count > MOST_SOUNDS:
         raise UserError(
-            f"{points:,} points, {len(options.strengths)} strengths and {options.variations} "
-            f"variations make {count:,} sounds, expected at most {MOST_SOUNDS:,}; name fewer"
+            f"{counted(points, 'point')}, {counted(len(options.strengths), 'strength')} and "
+            f"{counted(options.variations, 'variation')} make {count:,} sounds, "
+            f"expected at most {MOST_SOUNDS:,}; name fewer"
         )
 
 
