@@ -6,6 +6,7 @@ import io
 import json
 import shutil
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import soundfile
 
 from sound.__main__ import main
 from sound.export.engine_folder import STAGING
+from sound.export.full_scale import loudest_peak
 from sound.export.modal_model import ModalModel
 from sound.export.sound_set import NEARBY
 from sound.project.design_file import write_design
@@ -41,15 +43,17 @@ MODELS = [
 ]
 NODE = """
 import { pathToFileURL } from "node:url";
-const [path, point, strength, contact, rate] = process.argv.slice(-5);
+const [path, point, strength, contact, rate, how] = process.argv.slice(-6);
 const { render } = await import(pathToFileURL(path));
-const samples = render(point, 0.5, +rate, { strength: +strength, contactSeconds: +contact });
+const strike = { strength: +strength, contactSeconds: +contact };
+const samples = render(point, 0.5, +rate, { ...strike, ...JSON.parse(how) });
 process.stdout.write(Buffer.from(samples.buffer).toString("base64"));
 """
-BROWSER = """async ([point, strength, contact, rate]) => {
+BROWSER = """async ([point, strength, contact, rate, how]) => {
   const { createSolid } = await import("/pan.js");
   const context = new OfflineAudioContext(1, rate / 2, rate);
-  const solid = await createSolid(context, [{ point, strength, contactSeconds: contact }]);
+  const strikes = [{ point, strength, contactSeconds: contact }];
+  const solid = await createSolid(context, { strikes, ...how });
   solid.connect(context.destination);
   const samples = (await context.startRendering()).getChannelData(0);
   return Array.from(samples);
@@ -335,13 +339,19 @@ def test_impact_objects_ring_as_the_points_do(folder):
     np.testing.assert_allclose(factors, factors[0], rtol=1e-6)
 
 
+def in_node(folder: Path, point: str, strength: float, contact: float, rate: int, how: str = "{}"):
+    """What `render` of the module gives, as a finished program."""
+    if shutil.which("node") is None:
+        pytest.skip("node is not installed")
+    given = (folder / "pan.mjs", point, strength, contact, rate, how)
+    return run("node", "--input-type=module", "-e", NODE, "--", *given)
+
+
 @pytest.mark.parametrize(("contact", "rate"), [(0.0, RATE), (1.3e-3, 48_000)])
 @pytest.mark.parametrize("point", ["corner", "side"])
 def test_node_plays_what_we_render(folder, point, contact, rate):
-    if shutil.which("node") is None:
-        pytest.skip("node is not installed")
-    words = ("--input-type=module", "-e", NODE, "--", folder / "pan.mjs", point, 2.0, contact, rate)
-    made = np.frombuffer(base64.b64decode(run("node", *words, check=True).stdout))
+    done = in_node(folder, point, 2.0, contact, rate, '{"gain": 1}')
+    made = np.frombuffer(base64.b64decode(done.stdout))
     truth = rendered(POINTS.index(point), 2.0, contact, rate, 0.5)
     np.testing.assert_allclose(made, truth, atol=1e-9 * np.abs(truth).max())
 
@@ -350,22 +360,38 @@ def test_a_browser_plays_what_we_render(folder):
     with chromium() as browser, served(folder) as address:
         page = browser.new_page()
         page.goto(address)
-        for number, contact in enumerate((0.0, 1.3e-3)):
-            made = np.array(page.evaluate(BROWSER, [POINTS[number], 2.0, contact, RATE]))
-            truth = rendered(number, 2.0, contact, RATE, 0.5)
+        gain = page.evaluate("async () => (await import('/pan.js')).model.gain")
+        for number, contact, how in ((0, 0.0, {}), (1, 1.3e-3, {"gain": 1.0})):
+            made = np.array(page.evaluate(BROWSER, [POINTS[number], 2.0, contact, RATE, how]))
+            truth = how.get("gain", gain) * rendered(number, 2.0, contact, RATE, 0.5)
             assert len(made) == len(truth)
             np.testing.assert_allclose(made, truth, atol=1e-6 * np.abs(truth).max())
         assert page.evaluate("async () => (await import('/pan.js')).model.name") == "pan"
 
 
-def test_a_module_names_the_points_that_it_has(folder):
-    if shutil.which("node") is None:
-        pytest.skip("node is not installed")
-    words = ("--input-type=module", "-e", NODE, "--", folder / "pan.mjs", "lid", 1.0, 0.0, RATE)
-    assert (
-        "there is no point lid, expected a number below 2 or one of corner, side"
-        in run("node", *words).stderr
+@pytest.mark.parametrize("rate", [RATE, 48_000])
+def test_a_module_s_strikes_of_1_newton_second_fill_full_scale_and_stay_within(folder, rate):
+    peaks = []
+    for number, point in enumerate(POINTS):
+        made = np.frombuffer(base64.b64decode(in_node(folder, point, 1.0, 0.0, rate).stdout))
+        peaks.append(np.abs(made).max())
+        assert np.abs(rendered(number, 1.0, 0.0, rate, 0.5)).max() > peaks[-1]  # it would clip
+    assert 0.95 < max(peaks) < 1.0
+
+
+def test_faint_models_are_not_made_louder():
+    model = ModalModel.of_design(small_design())
+    peak = loudest_peak(model.frequencies, model.dampings, model.amplitudes, RATE)
+    assert peak == pytest.approx(
+        max(np.abs(rendered(point, 1.0, 0.0, RATE, 1.0)).max() for point in (0, 1))
     )
+    gains = [replace(model, amplitudes=model.amplitudes * k).gain for k in (0.0, 1e-3, 9.0)]
+    assert gains[:2] == [1.0, 1.0] and gains[2] * 9.0 == pytest.approx(model.gain)
+
+
+def test_a_module_names_the_points_that_it_has(folder):
+    said = in_node(folder, "lid", 1.0, 0.0, RATE).stderr
+    assert "there is no point lid, expected a number below 2 or one of corner, side" in said
 
 
 def test_the_studio_packs_the_folder(folder, tmp_path):

@@ -26,6 +26,7 @@ import("stdfaust.lib");
 // frequency [Hz], t60 [s] (decay by 60 dB); amplitude(p, n) in samples of full scale per N s:
 // |u_n . inward| of the mass-normalised mode u_n [kg^-1/2] at point p, times the gain there, with
 // which 1 N s sounds as loud as the clip of a target.  What clips hold besides modes is left out.
+// With a gain of $gain after it, a strike of 1 N s at the loudest point stays within full scale.
 // Points (position in m):
 $points
 nModes = $n_modes;
@@ -85,6 +86,7 @@ def faust_program(model: ModalModel) -> str:
         "name": plain(model.name),
         "version": __version__,
         "points": "\n".join(listed),
+        "gain": f"{model.gain:.4g}",
         "n_modes": len(model.frequencies),
         "n_positions": len(names),
         "struck": "its point" if len(names) == 1 else f"one of {len(names):,} points",

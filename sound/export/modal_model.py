@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from carillon.arrays import Array
+from sound.export.full_scale import gain_within
 from sound.levels import DECAY_NEPERS
 from sound.project.design import Design
 from sound.rendering.listening import Listening
@@ -60,6 +62,11 @@ class ModalModel:
             np.maximum(solid.dampings, LEAST_DAMPING),
             gains * solid.amplitudes(positions, inward),
         )
+
+    @cached_property
+    def gain(self) -> float:
+        """Factor, 1 at most, that keeps 1 N s at the loudest point within full scale."""
+        return gain_within(self.frequencies, self.dampings, self.amplitudes)
 
     @property
     def decay_times(self) -> Array:

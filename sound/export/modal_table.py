@@ -15,6 +15,7 @@ from sound.export.modal_model import ModalModel, plain
 
 FORMAT = "carillon modal table 1"
 UNITS = {
+    "gain": "factor that keeps an impulse of 1 N s at the loudest point within full scale",
     "frequency_hz": "frequency f of the mode",
     "decay_per_second": "d of the envelope exp(-d t)",
     "t60_seconds": "ln(1000) / d, in which the mode decays by 60 dB",
@@ -43,6 +44,7 @@ def modal_json(model: ModalModel) -> dict[str, Any]:
         "format": FORMAT,
         "generator": f"Carillon {__version__}",
         "name": model.name,
+        "gain": model.gain,
         "units": UNITS,
         "modes": [
             {"frequency_hz": float(f), "decay_per_second": float(d), "t60_seconds": float(t60)}

@@ -7,10 +7,14 @@
 //   solid.strike(0); // the first point, with 1 N s
 //   solid.strike("rim", { strength: 0.5, contactSeconds: 0.001, at: context.currentTime + 0.1 });
 //
+// All samples are multiplied by a gain, by default `model.gain`: it keeps a strike of 1 N s at the loudest point
+// within full scale. Harder strikes, and strikes while others ring, may go beyond, and browsers clip that: give a
+// smaller gain, `createSolid(context, { gain: 0.3 })`. With a gain of 1, 1 N s sounds as loud as the clip of a target.
+//
 // The file is its own AudioWorklet module, so that it has to have an address (http:, https: or blob:). `render`
 // needs no browser.  Made by Carillon $version.
 
-/** Frequencies [Hz], dampings [1/s], and amplitudes of the points [full scale per N s]. */
+/** Gain, frequencies [Hz], dampings [1/s], and amplitudes of the points [full scale per N s], without the gain. */
 export const model = $model;
 
 const PROCESSOR = "$processor";
@@ -40,8 +44,9 @@ function halfSine(seconds, rate) {
 
 /** The modes: each is a complex number that turns and decays with every sample, and a force is added to it. */
 class Modes {
-  constructor(rate) {
+  constructor(rate, gain) {
     this.rate = rate;
+    this.gain = gain;
     this.strikes = [];
     this.modes = model.frequencies.map((hertz, k) => {
       const size = Math.exp(-model.dampings[k] / rate);
@@ -53,7 +58,7 @@ class Modes {
 
   /** A strike from a frame on; frames may be fractions, and are rounded up. */
   strike({ point, strength = 1, contactSeconds = 0 }, frame) {
-    const gains = model.points[point].amplitudes.map((amplitude) => strength * amplitude);
+    const gains = model.points[point].amplitudes.map((amplitude) => this.gain * strength * amplitude);
     this.strikes.push({ gains, force: halfSine(contactSeconds, this.rate), first: Math.ceil(frame) });
   }
 
@@ -89,11 +94,12 @@ class Modes {
  * @param {number | string} point Number or name.
  * @param {number} seconds Length of the sound.
  * @param {number} rate Samples per second.
- * @param {{strength?: number, contactSeconds?: number}} [how] Impulse [N s], and duration of the force [s].
+ * @param {{strength?: number, contactSeconds?: number, gain?: number}} [how] Impulse [N s], duration of the force
+ *   [s], and factor on the samples.
  * @returns {Float64Array}
  */
-export function render(point, seconds, rate, how = {}) {
-  const modes = new Modes(rate);
+export function render(point, seconds, rate, { gain = model.gain, ...how } = {}) {
+  const modes = new Modes(rate, gain);
   modes.strike({ ...how, point: pointNumber(point) }, 0);
   const out = new Float64Array(Math.round(seconds * rate));
   modes.addTo(out, 0);
@@ -105,14 +111,17 @@ export function render(point, seconds, rate, how = {}) {
  * time of the context [s].
  *
  * @param {BaseAudioContext} context
- * @param {{point: number | string, strength?: number, contactSeconds?: number, at?: number}[]} [strikes] Those that
- *   are known from the beginning; a context that renders offline takes no others in time.
+ * @param {object} [how]
+ * @param {{point: number | string, strength?: number, contactSeconds?: number, at?: number}[]} [how.strikes] Those
+ *   that are known from the beginning; a context that renders offline takes no others in time.
+ * @param {number} [how.gain] Factor on the samples.
  * @returns {Promise<AudioWorkletNode & {strike: (point: number | string, how?: object) => void}>}
  */
-export async function createSolid(context, strikes = []) {
+export async function createSolid(context, { strikes = [], gain = model.gain } = {}) {
   await context.audioWorklet.addModule(import.meta.url);
   const known = strikes.map((each) => ({ ...each, point: pointNumber(each.point) }));
-  const options = { numberOfInputs: 0, outputChannelCount: [1], processorOptions: { strikes: known } };
+  const processorOptions = { strikes: known, gain };
+  const options = { numberOfInputs: 0, outputChannelCount: [1], processorOptions };
   const node = new AudioWorkletNode(context, PROCESSOR, options);
   node.strike = (point, how = {}) => node.port.postMessage({ ...how, point: pointNumber(point) });
   return node;
@@ -124,7 +133,7 @@ if (typeof registerProcessor === "function") {
     class extends AudioWorkletProcessor {
       constructor({ processorOptions }) {
         super();
-        this.modes = new Modes(sampleRate);
+        this.modes = new Modes(sampleRate, processorOptions.gain);
         this.samples = new Float64Array(128);
         processorOptions.strikes.forEach((strike) => this.take(strike));
         this.port.onmessage = ({ data }) => this.take(data);

@@ -26,6 +26,7 @@ def web_audio_module(model: ModalModel) -> str:
     content = json.dumps(
         {
             "name": model.name,
+            "gain": model.gain,
             "frequencies": model.frequencies.tolist(),
             "dampings": model.dampings.tolist(),
             "points": [
