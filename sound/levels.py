@@ -22,6 +22,8 @@ END_DBFS = -60.0
 """Greatest level [dBFS] at which a sound ends without a fade."""
 DECAY_NEPERS = np.log(1e3)
 """Decay by 60 dB [nepers]."""
+SILENCE_DBFS = -144.0
+"""Level [dBFS] below which an end is told to be silent: less than a step of 24 bits."""
 END_SECONDS = 0.1
 """Length of the end whose level is told [s]."""
 FADE_SHARE, LONGEST_FADE = 0.1, 0.5
@@ -241,15 +243,18 @@ class SoundLevel:
         --------
         >>> SoundLevel(-18.44, -1.02, -21.3, 0.5).in_words()
         '-18.4 LUFS, peak -1.0 dBFS, ends at -21.3 dBFS with a fade of 0.5 s'
+        >>> SoundLevel(-18.44, -1.02, -5008.7, 0.0).in_words()
+        '-18.4 LUFS, peak -1.0 dBFS, ends in silence'
         >>> SoundLevel(None, None, None, 0.0).in_words()
         'silent'
         """
         if self.peak_dbfs is None:
             return "silent"
         loudness = "below -70" if self.loudness_lufs is None else f"{self.loudness_lufs:.1f}"
-        end = "silence" if self.end_dbfs is None else f"{self.end_dbfs:.1f} dBFS"
+        is_silent = self.end_dbfs is None or self.end_dbfs < SILENCE_DBFS
+        end = "in silence" if is_silent else f"at {self.end_dbfs:.1f} dBFS"
         fade = f" with a fade of {self.fade_seconds:.3g} s" if self.fade_seconds else ""
-        return f"{loudness} LUFS, peak {self.peak_dbfs:.1f} dBFS, ends at {end}{fade}"
+        return f"{loudness} LUFS, peak {self.peak_dbfs:.1f} dBFS, ends {end}{fade}"
 
 
 def _finite(value: float) -> float | None:

@@ -14,6 +14,7 @@ from carillon.errors import UserError
 from sound.__main__ import main
 from sound.bounds import MOST_CHANNELS, MOST_CLIP_SAMPLES, MOST_SAMPLES, require_length
 from sound.clips.extraction import extract
+from sound.clips.formats import CLIP_FORMATS
 from sound.clips.instruments import INSTRUMENTS, note_hertz, synthesised
 from sound.clips.wav import PEAK, read_wav, write_wav
 from sound.commands.clip import NAMES
@@ -84,7 +85,7 @@ def bad_clips(samples: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         "silent": (np.zeros(100), "is silent"),
         "empty": (np.zeros(0), "has no samples"),
         "clipped": (clipped, rf"is clipped \({count} samples at full scale"),
-        "broken": (broken, "has 2 samples that are not finite"),
+        "broken": (broken, "has samples that are not finite numbers .*, 2 of"),
         "loud": (1e300 * samples, r"reaches .*e\+299 times full scale, expected at most 1e\+06"),
         "louder": (np.sign(samples) * np.finfo(float).max, "times full scale"),
         "faint": (1e-300 * samples, "is silent, or nearly so"),
@@ -117,7 +118,16 @@ def test_samples_without_a_header_are_answered_in_one_sentence(tmp_path, samples
     path.write_bytes(samples.astype("<i2").tobytes())
     with pytest.raises(UserError) as caught:
         read_wav(path)
-    assert re.fullmatch(rf"{path}: [^\n]*expected a sound clip \(WAV\)[^\n]*", str(caught.value))
+    formats = r"\(WAV, FLAC, Ogg, AIFF or MP3\)"
+    assert re.fullmatch(rf"{path}: [^\n]*expected a sound clip {formats}[^\n]*", str(caught.value))
+
+
+@pytest.mark.parametrize("ending", ["flac", "ogg", "aiff", "mp3"])
+def test_the_formats_that_are_named_are_read(tmp_path, samples, ending):
+    assert ending in CLIP_FORMATS.lower()
+    path = tmp_path / f"clip.{ending}"
+    soundfile.write(path, samples, RATE)
+    assert read_wav(path)[1] == RATE
 
 
 def with_field(field: bytes, offset: int, value: int) -> Callable[[bytes], bytes]:

@@ -219,7 +219,7 @@ def noise(count: int = 4000) -> np.ndarray:
     ("clip", "message"),
     [
         (np.zeros(4000), "is silent"),
-        (np.full(4000, np.nan), "has 4000 samples that are not finite"),
+        (np.full(4000, np.nan), "has samples that are not finite"),
         (noise(), "no modes that stand out"),
         (np.eye(1, 4000)[0], "falls silent 1 samples after its strike"),
         (single(440.0, 0.0, 1.0) + 1e-3 * noise(RATE), "does not decay"),

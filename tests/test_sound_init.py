@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import trimesh
 import yaml
 
 from carillon.parameters.documents import with_defaults
@@ -118,6 +119,16 @@ def test_without_a_clip_one_is_to_be_recorded(here, capsys):
     assert "clip.wav" in capsys.readouterr().out
     shutil.copy("metal.wav", "clip.wav")
     assert len(targets_of(load_project(here / "bar.yaml")).frequencies) > 2
+
+
+def test_a_shell_is_advised_by_an_option_that_there_is(here, caplog):
+    bowl = trimesh.creation.icosphere(radius=0.1)
+    bowl.update_faces(bowl.triangles_center[:, 2] < 0.03)
+    bowl.export("bowl.obj")
+    assert main(["init", "full.yaml", "--mesh", "bowl.obj"]) == 0
+    (wall,) = re.findall("give (--wall .*)", caplog.text)
+    assert main(["init", "shell.yaml", "--mesh", "bowl.obj", *wall.split()]) == 0
+    assert yaml.safe_load(Path("shell.yaml").read_text())["discretisation"] == "finite-cell"
 
 
 def test_nothing_is_overwritten(here, refuses):

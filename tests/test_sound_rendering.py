@@ -317,6 +317,17 @@ def test_normalised_sounds_reach_full_scale_and_the_gain_is_told(tmp_path, stren
     assert f"scaled by {told['scale']:.4g}" in capsys.readouterr().out
 
 
+def test_what_sounds_is_told_in_short_lines(tmp_path, capsys):
+    write_design(tmp_path / "design.h5", small_design())
+    out = tmp_path / "hit.wav"
+    words = ["render", tmp_path / "design.h5", "--target", "side", "--rate", 2000, "--out", out]
+    assert run([*words, "--strength", 99, "--seconds", 600, "--no-residual"]) == 0
+    file, *lines = capsys.readouterr().out.splitlines()
+    assert file.startswith(f"{out}: 600 s, ") and "ends in silence" in lines[0]
+    assert {line.split()[0] for line in lines} >= {"level:", "scaled", "left"}
+    assert max(len(line) for line in lines) < 90
+
+
 def test_modes_too_damped_to_oscillate_are_left_out(tmp_path):
     model = uniform_box(4, 3, 2, 0.05)
     result = solve(model, modes=RIGID_MODES + 4, method="slepc")

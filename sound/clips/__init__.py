@@ -1,1 +1,1 @@
-"""Sound clips: reading and writing WAV, their modes, and synthesised examples."""
+"""Sound clips: reading and writing sound files, their modes, and synthesised examples."""

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.command_line.counts import counted
 from carillon.command_line.progress import Watch, watched
 from carillon.errors import UserError
 from carillon.processes.threads import blas_threads
@@ -168,9 +169,8 @@ def _require_sound(clip: Array) -> None:
     if clip.ndim != 1:
         raise ValueError(f"samples of shape {clip.shape}, expected one channel")
     if not np.isfinite(clip).all():
-        bad = int((~np.isfinite(clip)).sum())
         raise UserError(
-            f"the clip has {bad} samples that are not finite numbers; repair or record it again"
+            "the clip has samples that are not finite numbers; repair or record it again"
         )
     try:
         require_level(float(np.abs(clip).max(initial=0.0)))
@@ -230,8 +230,8 @@ def _require_modes(fit: Fit, samples: int, rate: int) -> None:
 def _as_sound(fit: Fit, clip: Array, rate: int, scale: float, modes: int | None) -> ModalSound:
     if modes is not None and modes > len(fit.exponents):
         raise UserError(
-            f"{modes} modes asked for, more than the {len(fit.exponents)} that were extracted from "
-            "the clip; ask for fewer"
+            f"{counted(modes, 'mode')} asked for, more than the {len(fit.exponents)} that "
+            "were extracted from the clip; ask for fewer"
         )
     residual = clip - superposed(fit.exponents, fit.coefficients * scale, len(clip))
     energies = np.abs(fit.coefficients) ** 2 / -fit.exponents.real
@@ -271,7 +271,7 @@ def oddities(evidence: Mapping[str, Any]) -> list[str]:
     """The remarks on what else than free vibration is in the evidence of a `ModalSound`."""
     sentences = []
     if evidence["clipped_samples"]:
-        sentences.append(f"{evidence['clipped_samples']} samples at full scale are left out")
+        sentences.append(f"{counted(evidence['clipped_samples'], 'sample')} at full scale left out")
     if evidence["second_strike_seconds"] is not None:
         sentences.append(
             f"there is another strike at {evidence['second_strike_seconds']:.2f} s, left out"

@@ -29,7 +29,7 @@ def extract_file(
     allow_clipped: bool = False,
     progress: Progress | None = None,
 ) -> ModalSound:
-    """Modes of the clip in a WAV file, see `extract`, whose errors then name the file.
+    """Modes of the clip in a sound file, see `extract`, whose errors then name the file.
 
     They come from the user's cache if the clip was searched before.  Clipped clips are refused
     unless `allow_clipped`.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from sound.clips.audibility import heard_partials, loudness_shares
 from sound.clips.extraction import ModalSound
@@ -125,8 +126,8 @@ def share_frequencies(
     count = int(groups.max()) + 1
     if isinstance(modes, int) and modes > count:
         raise UserError(
-            f"{modes} modes asked for, more than the {count} that were extracted from the clips "
-            f"({', '.join(names)}); ask for fewer"
+            f"{counted(modes, 'mode')} asked for, more than the {count} that were extracted "
+            f"from the clips ({', '.join(names)}); ask for fewer"
         )
     table = np.zeros((len(sounds), count))
     covered = table.copy()
@@ -183,8 +184,7 @@ def without_modes(sound: ModalSound, hertz: Sequence[float]) -> ModalSound:
             kept[nearest] = False
     if not kept.any():
         raise UserError(
-            f"all {len(kept)} modes of the clip are left out (without), expected one at least to "
-            "be kept"
+            "all modes of the clip are left out (without), expected one at least to be kept"
         )
     names = ("frequencies", "dampings", "amplitudes", "phases")
     return replace(sound, **{name: getattr(sound, name)[kept] for name in names})

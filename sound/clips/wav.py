@@ -18,6 +18,7 @@ from sound.bounds import (
     MOST_CLIP_SAMPLES,
     require_level,
 )
+from sound.clips.formats import A_CLIP
 from sound.clips.free_vibration import CLIPPED_RUN, is_clipped
 from sound.levels import dithered
 from sound.outputs import require_output
@@ -44,7 +45,7 @@ def read_wav(path: str | Path, allow_clipped: bool = False) -> tuple[Array, int]
     or longer than `MOST_CLIP_SAMPLES`, or has samples that are not finite numbers; or if its rate,
     its number of channels or its level is beyond `sound.bounds`.
     """
-    path = require_file(path, "a sound clip (WAV)")
+    path = require_file(path, A_CLIP)
     try:
         channels, rate = _channels(path)
         return _heard(channels, allow_clipped), rate
@@ -125,13 +126,12 @@ def _channels(path: Path) -> tuple[Array, int]:
     except TypeError:  # the library asks for the header's values
         raise UserError(
             "has samples alone by its name, without a header that tells their rate and kind; "
-            "expected a sound clip (WAV), convert it to one"
+            f"expected {A_CLIP}, convert it to one"
         ) from None
     except (soundfile.LibsndfileError, OSError) as error:
         said = cause(error) if isinstance(error, OSError) else str(error).rsplit(": ", 1)[-1]
         raise UserError(
-            f"is not readable as a sound file ({str(said).strip().rstrip('.')}), expected a sound "
-            "clip (WAV)"
+            f"is not readable as a sound file ({str(said).strip().rstrip('.')}), expected {A_CLIP}"
         ) from None
     if missing:
         raise UserError("ends before the samples that it claims to hold; copy or record it again")
@@ -162,8 +162,8 @@ def _heard(channels: Array, allow_clipped: bool) -> Array:
     bad = int((~np.isfinite(channels)).sum())
     if bad:
         raise UserError(
-            f"has {bad} samples that are not finite numbers (NaN or infinite); repair or record it "
-            "again"
+            "has samples that are not finite numbers (NaN or infinite), "
+            f"{bad:,} of {channels.size:,}; repair or record it again"
         )
     require_level(float(np.abs(channels).max()))
     clipped = [int(is_clipped(channel).sum()) for channel in channels.T]

@@ -4,6 +4,7 @@ import argparse
 import json
 from typing import Annotated
 
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.command_line import add_options, collect
@@ -74,6 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
     low, high = sound.frequencies[[0, -1]]
     print(
         f"{options.out}: {options.seconds:g} s of struck {options.instrument}, "
-        f"{len(sound.frequencies)} partials from {low:.2f} to {high:.2f} Hz"
+        f"{counted(len(sound.frequencies), 'partial')} from {low:.2f} to {high:.2f} Hz"
     )
     return 0

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from carillon.command_line.counts import counted
 from carillon.command_line.progress import LINE_SECONDS, say
 from carillon.errors import UserError
 from carillon.fem.geometry.size import lengths_in_words
@@ -256,10 +257,13 @@ def _sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"cost {summary['cost_start']:.4g} -> {summary['cost']:.4g} ({summary['fall']:.1%} "
-            f"less) in {summary['seconds']:.1f} s and {summary['evaluations']:,} evaluations "
-            f"({summary['evaluations_per_minute']:,.0f} a minute, {summary['workers']} workers)"
+            f"less) in {summary['seconds']:.1f} s and "
+            f"{counted(summary['evaluations'], 'evaluation')} "
+            f"({summary['evaluations_per_minute']:,.0f} a minute, "
+            f"{counted(summary['workers'], 'worker')})"
             f"{_ENDINGS.get(summary['ended_by'], '')}",
-            f"frequencies of {summary['partials']} partials among {summary['modes']} modes: "
+            f"frequencies of {counted(summary['partials'], 'partial')} among "
+            f"{counted(summary['modes'], 'mode')}: "
             f"median error {summary['frequency_error_median_cents']:.1f} cents, worst "
             f"{summary['frequency_error_max_cents']:.1f} cents; "
             f"residuals of the modes up to {summary['residual_max']:.1e}",

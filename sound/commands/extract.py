@@ -8,10 +8,12 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from carillon.parameters.quantities import Count
+from sound.clips.formats import CLIP_FORMATS
 
 if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.clips.extraction import ModalSound
@@ -22,7 +24,7 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
 class ExtractOptions:
     """Clips whose modes are extracted, and what is written of them."""
 
-    clips: tuple[str, ...] = option(REQUIRED, "a strike each", metavar="CLIP.wav")
+    clips: tuple[str, ...] = option(REQUIRED, f"a strike each, as {CLIP_FORMATS}", metavar="CLIP")
     modes: Count | None = option(
         None,
         "modes to keep, shared by all clips, those that carry most (default: all)",
@@ -97,7 +99,8 @@ def _line(clip: dict[str, Any]) -> str:
     from sound.clips.extraction import remarks
 
     line = (
-        f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, {clip['order']} modes found, "
+        f"{clip['file']}: strike at {clip['strike_seconds']:.4f} s, "
+        f"{counted(clip['order'], 'mode')} found, "
         f"which explain {100.0 * clip['explained']:.2f} % of the energy"
     )
     return "; ".join([line, heard_in_words(clip["heard_hz"]), *remarks(clip)])

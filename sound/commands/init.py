@@ -12,6 +12,7 @@ from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from carillon.parameters.quantities import MetresPerUnit, UpAxis, WallThickness
+from sound.clips.formats import CLIP_FORMATS
 
 ENDINGS = (".yaml", ".yml")
 """Endings of the names of project files."""
@@ -38,7 +39,9 @@ class InitOptions:
         metavar="FOLDER|FILE",
     )
     clips: tuple[str, ...] | None = option(
-        None, "a strike each, at points spread over the surface", metavar="CLIP.wav"
+        None,
+        f"a strike each ({CLIP_FORMATS}), at points spread over the surface",
+        metavar="CLIP",
     )
     allow_clipped: bool = option(False, "leave out samples of clips at full scale")
     unit: MetresPerUnit = option(1.0)

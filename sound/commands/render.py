@@ -8,6 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
@@ -156,7 +157,7 @@ def run(arguments: argparse.Namespace) -> int:
     if options.modes_out is not None:
         write_wav(options.modes_out, sound.modes, options.rate, bits=bits, seed=seed)
     summary = _summary(options, heard, hits, sound)
-    print(json.dumps(summary) if options.json else _sentence(summary))
+    print(json.dumps(summary) if options.json else "\n".join(_lines(summary)))
     return 0
 
 
@@ -268,33 +269,37 @@ def _beside_clip(listening: Listening, hit: Hit, sound: RenderedSound) -> dict[s
     }
 
 
-def _sentence(summary: dict[str, Any]) -> str:
+def _lines(summary: dict[str, Any]) -> list[str]:
+    """What was written, one line for the file and one for each thing that is said of the sound."""
     from sound.levels import SoundLevel, decibels
 
-    hertz = summary["frequencies_hz"]
+    hertz, of_clips = summary["frequencies_hz"], summary["missed_share"] is not None
     span = f", {min(hertz):.4g} to {max(hertz):.4g} Hz" if hertz else ""
-    level = SoundLevel(*(summary[each.name] for each in fields(SoundLevel)))
-    text = f"{summary['out']}: {len(hertz)} modes{span}, {summary['seconds']:.3g} s, "
-    text += level.in_words()
+    level = SoundLevel(*(summary[each.name] for each in fields(SoundLevel))).in_words()
     if summary["cut_off"]:
-        text += " since it rings on (--seconds for more)"
-    if summary["scale"] != 1.0:
-        text += f"; scaled by {summary['scale']:.4g} ({decibels(summary['scale']):+.1f} dB)"
-    if summary["limited_decibels"]:
-        text += f"; peaks are attenuated by up to {summary['limited_decibels']:.1f} dB"
+        level += " since it rings on (--seconds for more)"
+    lines = [
+        f"{summary['out']}: {summary['seconds']:.3g} s, {counted(len(hertz), 'mode')}{span}",
+        f"level: {level}",
+    ]
     if summary["clip_loudness_lufs"] is not None:
-        text += (
-            f"; over the length of its clip {summary['loudness_over_clip_lufs']:.1f} LUFS, "
+        lines.append(
+            f"over the length of its clip: {summary['loudness_over_clip_lufs']:.1f} LUFS, "
             f"the clip {summary['clip_loudness_lufs']:.1f} LUFS"
         )
+    if of_clips and summary["residual_share"] > 0.0:
+        lines.append(f"noise of the clips: {summary['residual_share']:.1%} of the energy")
+    if summary["scale"] != 1.0:
+        factor = summary["scale"]
+        lines.append(f"scaled by {factor:.4g} ({decibels(factor):+.1f} dB)")
+    if summary["limited_decibels"]:
+        lines.append(f"peaks are attenuated by up to {summary['limited_decibels']:.1f} dB")
     if summary["modes_left_out"]:
-        text += f"; {summary['modes_left_out']} above half the sampling rate are left out"
-    if summary["missed_share"] is None:
-        return text
-    text += f"; {summary['residual_share']:.1%} of its energy is noise of the clips"
-    if summary["missed_share"] >= TOLD:
-        text += (
-            f"; tones with {summary['missed_share']:.1%} of the clips' energy are neither modes "
-            "nor noise and are left out"
+        many = counted(summary["modes_left_out"], "mode")
+        lines.append(f"left out: {many} above half the sampling rate")
+    if of_clips and summary["missed_share"] >= TOLD:
+        lines.append(
+            f"left out: tones with {summary['missed_share']:.1%} of the clips' energy, which are "
+            "neither modes nor noise"
         )
-    return text
+    return lines[:1] + [f"  {line}" for line in lines[1:]]

@@ -13,6 +13,7 @@ from carillon.parameters.quantities import (
     YoungsModulus,
     between,
 )
+from sound.clips.formats import CLIP_FORMATS
 
 LEAST_WEIGHT = 1e-12
 """Weight of frequencies or of amplitudes below which a search has nothing to lower."""
@@ -38,7 +39,7 @@ class TargetEntry:
     """One struck point, by its position or the number of its vertex."""
 
     name: ShownName = option(REQUIRED, "name of the point")
-    clip: File = option(REQUIRED, "file of the sound (WAV), relative to the project")
+    clip: File = option(REQUIRED, f"file of the sound ({CLIP_FORMATS}), relative to the project")
     at: Point | None = option(
         None,
         "position on the surface in the mesh's own coordinates, as viewers of meshes show them, or "

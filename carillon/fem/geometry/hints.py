@@ -72,16 +72,20 @@ class MeshHints:
             shell_thickness(max(x, y, z)) if is_filled else None,
         )
 
-    def say_size_and_filling(self, for_file: bool = False) -> None:
+    def say_size_and_filling(self, for_file: bool = False, names_cells: bool = True) -> None:
         """Log what bears on the modes, each hint once: a doubtful unit, and an open surface.
 
-        What mends it is an option of commands, or `for_file` a key of a project or scene.
+        What mends it is an option of commands, or `for_file` a key of a project or scene.  Commands
+        that take finite cells for a wall by themselves have no option that `names_cells`.
         """
         self._say_size(for_file)
-        self._say_filling(for_file)
+        self._say_filling(for_file, names_cells)
 
     def say(self, for_file: bool = False) -> None:
-        """Log all hints, each once, see `say_size_and_filling`: what changes most goes first."""
+        """Log all hints, each once: of a file's keys, or of the options of `carillon init`.
+
+        What changes most goes first.
+        """
         self._say_size(for_file)
         if self.up is not None:
             self._say(
@@ -89,19 +93,19 @@ class MeshHints:
                 f"--up {self.up} stands it up",
                 for_file,
             )
-        self._say_filling(for_file)
+        self._say_filling(for_file, names_cells=for_file)
 
     def _say_size(self, for_file: bool) -> None:
         if self.units and (hint := unit_hint(self.extents, self.unit)):
             self._say(hint, for_file)
 
-    def _say_filling(self, for_file: bool) -> None:
+    def _say_filling(self, for_file: bool, names_cells: bool) -> None:
         if self.shell is not None:
             thickness = lengths_in_words([self.shell]).replace(" ", "")
+            cells = ", which takes finite cells (--discretisation finite-cell)"
             self._say(
                 "its surface is open; what it surrounds is filled and makes a full solid. For a "
-                f"shell, give --wall {thickness}, which takes finite cells "
-                "(--discretisation finite-cell)",
+                f"shell, give --wall {thickness}{cells if names_cells else ''}",
                 for_file,
             )
 
