@@ -34,7 +34,7 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
     residuals = recomputed_residuals(*assembled(design.model), design.eigenvalues, design.modes)
     # The dataset that holds the nodes of the elements that the surface lies in.
     nodes = "cells" if isinstance(design.model, ElasticModel) else f"{FINITE_CELLS}/nodes"
-    attributes = {
+    attributes: dict[str, Any] = {
         "method": "sound design",
         "normalisation": NORMALISATION,
         "sound": SOUND,
@@ -43,6 +43,8 @@ def write_embedded(path: str | Path, design: Design, parameters: dict[str, Any])
     }
     if design.up is not None:
         attributes["up"] = design.up
+    if design.wall is not None:
+        attributes |= {"wall": design.wall.thickness, "wall_side": design.wall.side}
 
     def more(target: h5py.File) -> None:
         _put_more(target, design)

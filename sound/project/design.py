@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from carillon.arrays import Array, Integers
 from carillon.errors import UserError
 from carillon.fem.geometry.turning import remaining_turn
+from carillon.fem.geometry.walls import ABOUT, SIDES, WallSize
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.regions import RegionOf
 from carillon.parameters.quantities import UP_AXES
@@ -114,6 +115,12 @@ class Design:
     def up(self) -> str | None:
         """Axis of its mesh that was turned to z; None if its axes are those of the mesh."""
         return self.settings.get("up")
+
+    @property
+    def wall(self) -> WallSize | None:
+        """The wall that the solid is; None if its mesh encloses it."""
+        thickness, side = self.settings.get("wall"), self.settings.get("wall_side", ABOUT)
+        return None if thickness is None else WallSize(float(thickness), side)
 
     @property
     def frequencies(self) -> Array:
@@ -248,6 +255,11 @@ _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "mesh": ("a text", lambda value: isinstance(value, str)),
     "unit": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
     "up": (f"null or one of {', '.join(UP_AXES)}", lambda value: value in (None, *UP_AXES)),
+    "wall": (
+        "null or a number above 0",
+        lambda value: value is None or (_is_number(value) and value > 0.0),
+    ),
+    "wall_side": (f"one of {', '.join(SIDES)}", lambda value: value in SIDES),
     "material": ("keys and values", lambda value: isinstance(value, Mapping)),
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
 }
