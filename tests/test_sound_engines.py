@@ -292,15 +292,33 @@ def test_folders_that_cannot_be_are_refused(folder, tmp_path, refuses):
         main, "export", folder / "pan.h5", "--format", "folder", "--out", tmp_path / "file"
     )
     assert "is no folder" in said
+    new = f"{tmp_path / 'new'}/"
     said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'a/b'}/")
     assert "create it first" in said
     said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new.glb'}/")
     assert "ends in .glb, but a folder is asked for" in said
     said = refuses(main, "export", folder / "pan.h5", "--out", tmp_path)
     assert "/ for a folder" in said
+    said = refuses(main, "export", folder / "pan.h5", "--out", new, "--strengths", 1, 0.5, 1)
+    assert "found 1 0.5 1, expected each strength once" in said
     many = ["--points", "1000", "--variations", "32"]
     said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'new'}/", *many)
     assert "expected at most 2,000" in said and not (tmp_path / "new").exists()
+
+
+def test_a_full_disk_leaves_the_former_export_whole(folder, tmp_path, monkeypatch, refuses):
+    from carillon.errors import UserError
+
+    def full(path, *_):
+        raise UserError(f"{path.name}: could not be written") from OSError(28, "No space left")
+
+    path = tmp_path / "pan"
+    assert exported(folder, "pan.h5", path, *FEW) == 0
+    before = {name: (path / name).read_bytes() for name in names_in(path)}
+    monkeypatch.setattr("sound.export.engine_folder.write_gltf", full)
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{path}/", "--strengths", 1)
+    assert "pan.glb: could not be written" in said
+    assert {name: (path / name).read_bytes() for name in names_in(path)} == before
 
 
 def test_the_model_of_a_folder_is_valid(folder):
@@ -322,6 +340,25 @@ def test_tables_have_frequencies_decays_and_amplitudes(folder):
         written = [float(row[f"amplitude_{point}"]) for row in rows]
         np.testing.assert_allclose(written, model.amplitudes[number], rtol=1e-8)
     assert set(told["units"]) >= set(columns) | {"amplitudes", "position_m", "inward"}
+
+
+def test_points_have_one_name_in_files_and_columns(tmp_path):
+    design = small_design()
+    names = ["Läute; left_ear", "läute-left ear"]
+    strikes = [replace(each, name=name) for each, name in zip(design.strikes, names, strict=True)]
+    targets = replace(design.targets, names=tuple(names))
+    write_design(tmp_path / "Big pan.h5", replace(design, strikes=strikes, targets=targets))
+    path = tmp_path / "folder"
+    words = ["--points", "1", "--strengths", "1", "--variations", "1"]
+    assert exported(tmp_path, "Big pan.h5", path, *words) == 0
+    points = json.loads((path / "big_pan-modes.json").read_text())["points"]
+    assert [each["name"] for each in points][:2] == names
+    (columns,) = list(csv.reader((path / "big_pan-modes.csv").open()))[:1]
+    keys = [column.removeprefix("amplitude_") for column in columns if "amplitude" in column]
+    assert keys == ["laute_left_ear", "laute_left_ear_2", points[2]["name"]]
+    sounds = [f"sounds/big_pan_{key}_s1_v1.wav" for key in keys]
+    objects = [f"big_pan_{key}.impobj" for key in keys]
+    assert names_in(path) >= {*sounds, *objects}
 
 
 def test_impact_objects_ring_as_the_points_do(folder):
@@ -399,6 +436,6 @@ def test_the_studio_packs_the_folder(folder, tmp_path):
     Exports().make(str(folder / "pan.h5"), "zip", None, str(out), "my-pan")
     with zipfile.ZipFile(out) as archive:
         names = set(archive.namelist())
-        assert 'declare name "my-pan";' in archive.read("my-pan/my-pan.dsp").decode()
-    assert {"my-pan/my-pan.glb", "my-pan/sounds.csv", "my-pan/my-pan.js"} <= names
+        assert 'declare name "my-pan";' in archive.read("my-pan/my_pan.dsp").decode()
+    assert {"my-pan/my_pan.glb", "my-pan/sounds.csv", "my-pan/my_pan.js"} <= names
     assert sum(name.endswith(".wav") for name in names) == 18

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from carillon.fem.geometry.walls import WallSize
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import fine_model, mass_properties
 from carillon.fem.regions import Regions
@@ -169,6 +170,22 @@ def test_a_design_of_a_turned_mesh_is_not_turned_again(tmp_path, settings, up, h
         assert np.ptp(body.shape.vertices, axis=0)[2] == pytest.approx(SIDES[height])
 
 
+@pytest.mark.parametrize(
+    ("settings", "wall"),
+    [
+        ({}, None),
+        ({"wall": None, "wall_side": "inside"}, None),
+        ({"wall": 0.002, "wall_side": "outside"}, WallSize(0.002, "outside")),
+    ],
+)
+def test_a_modes_file_of_a_design_names_its_wall(tmp_path, settings, wall):
+    design = small_design()
+    write_embedded(
+        tmp_path / "pan.h5", replace(design, settings={**design.settings, **settings}), {}
+    )
+    assert read_modes(tmp_path / "pan.h5").wall == wall
+
+
 def test_gltf_has_normals_and_the_material_as_colours(folder):
     document, data = read_gltf(folder / "pan.glb")
     ((surface,),) = (mesh["primitives"] for mesh in document["meshes"])
@@ -324,7 +341,7 @@ def test_faust_s_program_names_points_and_units(folder):
     text = (folder / "pan.dsp").read_text()
     assert 'declare name "design";' in text  # of the design, not of the file
     assert "nPositions = 5;" in text and f"nModes = {N_MODES};" in text
-    assert "'corner':0;'side':1;'vertex " in text
+    assert "'corner':0;'side':1;'vertex_" in text
     assert "N s" in text and "kg^-1/2" in text
 
 

@@ -294,7 +294,7 @@ def _rms_sentence(summary: dict[str, Any]) -> str:
         return f"from their targets (rms): {coarse:.1f} cents"
     return (
         f"from their targets (rms): {coarse:.1f} cents on the coarse solid, {fine:.1f} on the fine "
-        f"one, by {len(summary['checks'])} checks"
+        f"one, by {counted(len(summary['checks']), 'check')}"
     )
 
 

@@ -19,8 +19,9 @@ from sound.export.gltf import write_gltf
 from sound.export.level_table import LevelRow, levels_csv, levels_json, with_gains
 from sound.export.modal_model import ModalModel
 from sound.export.modal_table import impact_objects, write_modal_csv, write_modal_json
+from sound.export.names import file_name, file_names
 from sound.export.placing import SOUNDS, TABLE, place, require_places
-from sound.export.sound_set import file_names, rendered_set, require_count
+from sound.export.sound_set import rendered_set, require_count
 from sound.export.sound_set_options import SoundSetOptions
 from sound.export.web_audio import web_audio_module
 from sound.export.wwise import wwise_import
@@ -109,7 +110,7 @@ def _write_all(
     settings: ExportSettings,
 ) -> WrittenFolder:
     """Tables of sounds are the last files: who finds them, finds what they name."""
-    label = file_names([model.name])[0]
+    label = file_name(model.name, "solid")
     (folder / SOUNDS).mkdir()
     made = []
     for sound in rendered_set(design, model.name, model.points, options):
@@ -121,6 +122,8 @@ def _write_all(
             write(folder / file)
             files.append(file)
         except UserError as error:
+            if isinstance(error.__cause__, OSError):  # the disk, not the model
+                raise
             say(f"{file} is left out: {error}")
             missing.append(file)
     levels = with_gains(made)

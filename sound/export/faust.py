@@ -13,7 +13,8 @@ from typing import Any
 from carillon import __version__
 from carillon.arrays import Array
 from carillon.files.atomic import atomic_path
-from sound.export.modal_model import ModalModel, plain
+from sound.export.modal_model import ModalModel
+from sound.export.names import plain
 
 _TEMPLATE = Template("""\
 declare name "$name";

@@ -25,7 +25,7 @@ COLUMNS = {
     "rendered_peak_db": "peak of the sound before it was scaled; clips of targets have full scale",
     "seconds": "length of the file",
     "contact_seconds": "duration of the force",
-    "x_m": "where it was struck, in the axes of the mesh",
+    "x_m": "where it was struck, in the axes of the design",
     "y_m": "",
     "z_m": "",
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -91,17 +90,6 @@ def struck_points(design: Design, points: int = 0) -> tuple[StruckPoint, ...]:
         others = design.surface_vertices[chosen]
         surface = trimesh.Trimesh(design.surface_vertices, design.surface_faces, process=False)
         normals = inward_normals(surface, others)
-        names = [f"vertex {vertex}" for vertex in chosen]
+        names = [f"vertex_{vertex}" for vertex in chosen]
         struck += map(StruckPoint, names, others, normals)
     return tuple(struck)
-
-
-def plain(name: str) -> str:
-    """A name of letters, digits and ` .+-_` alone, which every program takes.
-
-    Examples
-    --------
-    >>> plain("rim; left/upper")
-    'rim_ left_upper'
-    """
-    return re.sub(r"[^\w .+-]", "_", name)

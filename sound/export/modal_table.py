@@ -11,7 +11,8 @@ from typing import Any
 
 from carillon import __version__
 from carillon.files.atomic import atomic_path
-from sound.export.modal_model import ModalModel, plain
+from sound.export.modal_model import ModalModel
+from sound.export.names import file_names
 
 FORMAT = "carillon modal table 1"
 UNITS = {
@@ -20,7 +21,7 @@ UNITS = {
     "decay_per_second": "d of the envelope exp(-d t)",
     "t60_seconds": "ln(1000) / d, in which the mode decays by 60 dB",
     "amplitudes": "samples of full scale after an impulse of 1 N s along the inward normal",
-    "position_m": "in the axes of the mesh, in metres",
+    "position_m": "in the axes of the design, in metres",
     "inward": "unit vector into the solid",
     "sound": "impulse times the sum over modes of amplitude exp(-d t) sin(2 pi f t)",
 }
@@ -76,7 +77,7 @@ def modal_csv(model: ModalModel) -> str:
     """The content of the CSV file."""
     content = io.StringIO()
     table = csv.writer(content, lineterminator="\n")
-    columns = [f"amplitude_{plain(point.name).replace(' ', '_')}" for point in model.points]
+    columns = [f"amplitude_{each}" for each in file_names([point.name for point in model.points])]
     table.writerow(["mode", "frequency_hz", "decay_per_second", "t60_seconds", *columns])
     rows = zip(model.frequencies, model.dampings, model.decay_times, model.amplitudes.T)
     for number, (frequency, damping, t60, amplitudes) in enumerate(rows, start=1):

@@ -23,7 +23,7 @@ LARGEST_TABLE = 64 * 2**20
 """Length [bytes] of a table that is read."""
 
 _OWN = re.compile(
-    rf"{SOUNDS}/[a-z0-9_-]+\.wav|[a-z0-9_-]+\.(glb|dsp|js|impobj)|[a-z0-9_-]+-modes\.(json|csv)"
+    rf"{SOUNDS}/[a-z0-9_]+\.wav|[a-z0-9_]+\.(glb|dsp|js|impobj)|[a-z0-9_]+-modes\.(json|csv)"
     rf"|{SOUNDS}-wwise\.txt|{SOUNDS}\.(csv|json)"
 )
 """Names of files that an export writes."""

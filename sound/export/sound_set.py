@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from sound.clips.wav import as_wav
 from sound.export.level_table import LevelRow, level_of
 from sound.export.mastering import mastered
 from sound.export.modal_model import StruckPoint
+from sound.export.names import file_name, file_names
 from sound.export.sound_set_options import SoundSetOptions
 from sound.project.design import Design
 from sound.rendering.listening import Listening
@@ -84,7 +84,7 @@ def rendered_set(
                 sound = render(solid, [hit], seconds, options.rate, contact, listening)
                 made, gain = mastered(sound, options.rate)
                 level = LevelRow(
-                    f"{file_names([name])[0]}_{label}_s{number}_v{variation}.wav",
+                    f"{file_name(name, 'solid')}_{label}_s{number}_v{variation}.wav",
                     point.name,
                     strength,
                     variation,
@@ -131,24 +131,3 @@ def _points_near(
     # Those within reach come first, in the order in which they were drawn.
     positions = positions[np.argsort(away > reach, kind="stable")[:count]]
     return found + list(zip(positions, inward_normals(surface, positions)))
-
-
-def file_names(names: Sequence[str]) -> list[str]:
-    """Names as parts of files' names, each a different one: small letters, digits, `-`.
-
-    Examples
-    --------
-    >>> file_names(["Rim left", "rim-left", "鐘"])
-    ['rim-left', 'rim-left-2', 'point']
-    """
-    taken: set[str] = set()
-    found = []
-    for name in names:
-        base = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "point"
-        own, number = base, 1
-        while own in taken:
-            number += 1
-            own = f"{base}-{number}"
-        taken.add(own)
-        found.append(own)
-    return found
