@@ -221,7 +221,7 @@ def noise(count: int = 4000) -> np.ndarray:
         (np.zeros(4000), "is silent"),
         (np.full(4000, np.nan), "has samples that are not finite"),
         (noise(), "no modes that stand out"),
-        (np.eye(1, 4000)[0], "falls silent 1 samples after its strike"),
+        (np.eye(1, 4000)[0], "falls silent 1 sample after its strike"),
         (single(440.0, 0.0, 1.0) + 1e-3 * noise(RATE), "does not decay"),
         (single(440.0, -3.0, 1.0), "does not decay"),
         (single(30.0, 5.0, 0.06), "less than 3 periods of its lowest mode"),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
 from carillon.arrays import Array, Flags
+from carillon.command_line.counts import counted
 from sound.clips.extraction import ModalSound
 from sound.synthesis.sinusoids import damped_sinusoids
 
@@ -77,9 +78,12 @@ def heard_in_words(hertz: Iterable[float]) -> str:
     --------
     >>> heard_in_words([440.0, 990.2])
     '2 partials are heard and count for a design: 440, 990 Hz'
+    >>> heard_in_words([440.0])
+    '1 partial is heard and counts for a design: 440 Hz'
     """
     listed = [f"{each:.0f}" for each in hertz]
-    return f"{len(listed)} partials are heard and count for a design: {', '.join(listed)} Hz"
+    count = "is heard and counts" if len(listed) == 1 else "are heard and count"
+    return f"{counted(len(listed), 'partial')} {count} for a design: {', '.join(listed)} Hz"
 
 
 def is_burst(sound: ModalSound) -> Flags:

@@ -121,8 +121,8 @@ def extract(
     clip = clip[: ending(clip, rate)].copy()
     if len(clip) < SHORTEST_SAMPLES:
         raise UserError(
-            f"the clip ends or falls silent {len(clip)} samples after its strike, expected "
-            f"{SHORTEST_SAMPLES} at least; give a longer recording"
+            f"the clip ends or falls silent {counted(len(clip), 'sample')} after its strike, "
+            f"expected {SHORTEST_SAMPLES} at least; give a longer recording"
         )
     _require_no_steady_tone(clip, rate)
     bend = glide(clip, rate)

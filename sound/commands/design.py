@@ -119,8 +119,8 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         require_same_voxels(problem, initial)
         so_far = initial.history["evaluations"][-1:].sum()
         say(
-            f"{options.initial_design or out}: going on after {so_far:,.0f} evaluations, "
-            f"{_budget(project.optimiser, ' more')}"
+            f"{options.initial_design or out}: going on after "
+            f"{counted(int(so_far), 'evaluation')}, {_budget(project.optimiser, ' more')}"
         )
     elif not options.watch:
         count = "1 process" if problem.workers == 1 else f"{problem.workers} processes"
