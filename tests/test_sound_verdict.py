@@ -221,4 +221,4 @@ def test_twin_modes_of_a_partial_count_once():
     hertz[1] = hertz[0] = 1.1 * hertz[1]
     design = with_targets(design, frequencies=hertz)
     partials = len(hertz) - 1
-    assert f"1 of {partials} partials are more" in judged(design, clips_of(design)).reason
+    assert f"1 of {partials} partials is more" in judged(design, clips_of(design)).reason

@@ -117,7 +117,9 @@ export function render(point, seconds, rate, { gain = model.gain, ...how } = {})
  * @param {number} [how.gain] Factor on the samples.
  * @returns {Promise<AudioWorkletNode & {strike: (point: number | string, how?: object) => void}>}
  */
-export async function createSolid(context, { strikes = [], gain = model.gain } = {}) {
+export async function createSolid(context, settings = {}) {
+  if (Array.isArray(settings)) throw new TypeError("expected { strikes, gain }, found a list; give { strikes: list }");
+  const { strikes = [], gain = model.gain } = settings;
   await context.audioWorklet.addModule(import.meta.url);
   const known = strikes.map((each) => ({ ...each, point: pointNumber(each.point) }));
   const processorOptions = { strikes: known, gain };

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.command_line.counts import counted
 from sound.clips.extraction import ModalSound
 from sound.design.search import BUDGET, INTERRUPT
 from sound.project.design import Design
@@ -112,8 +113,8 @@ def _far(judged: Judged) -> tuple[str, str] | None:
     wrong, partials = np.unique(hertz[far]), len(np.unique(hertz))
     side = "high" if off[worst] > 0.0 else "low"
     return (
-        f"{len(wrong)} of {partials} partials are more than {FAR_CENTS:.0f} cents off, that at "
-        f"{hertz[worst]:.0f} Hz {abs(off[worst]):.0f} cents too {side}",
+        f"{len(wrong)} of {counted(partials, 'partial')} {'is' if len(wrong) == 1 else 'are'} more "
+        f"than {FAR_CENTS:.0f} cents off, that at {hertz[worst]:.0f} Hz {abs(off[worst]):.0f} cents too {side}",
         _search_on(judged.design) or _without(wrong, partials),
     )
 
