@@ -112,9 +112,10 @@ def _far(judged: Judged) -> tuple[str, str] | None:
     hertz = targets.frequencies[which]
     wrong, partials = np.unique(hertz[far]), len(np.unique(hertz))
     side = "high" if off[worst] > 0.0 else "low"
+    are = "is" if len(wrong) == 1 else "are"
     return (
-        f"{len(wrong)} of {counted(partials, 'partial')} {'is' if len(wrong) == 1 else 'are'} more "
-        f"than {FAR_CENTS:.0f} cents off, that at {hertz[worst]:.0f} Hz {abs(off[worst]):.0f} cents too {side}",
+        f"{len(wrong)} of {counted(partials, 'partial')} {are} more than {FAR_CENTS:.0f} cents "
+        f"off, that at {hertz[worst]:.0f} Hz {abs(off[worst]):.0f} cents too {side}",
         _search_on(judged.design) or _without(wrong, partials),
     )
 
