@@ -7,6 +7,7 @@ import * as shown from "./numbers.js";
 /** @typedef {import("./content.js").Scene} Scene */
 
 const MOST_IMPACTS = 8;
+const HIGHEST_HEARD = 20_000; // Hz
 
 /**
  * @param {HTMLElement} element
@@ -42,7 +43,8 @@ export function listBodies(element, bodies, strike) {
 /** @param {Body} body @returns {string} */
 function soundOf({ voice }) {
   if (!voice) return "silent";
-  const lowest = shown.frequency(Math.min(...voice.hertz));
+  const hertz = Math.min(...voice.hertz);
+  const lowest = shown.frequency(hertz) + (hertz > HIGHEST_HEARD ? ", which nobody hears" : "");
   const { length } = voice.hertz;
   const says = length === 1 ? `1 mode, ${lowest}` : `${length} modes from ${lowest}`;
   return voice.expectedCents === null ? says : `${says}, about ${shown.cents(voice.expectedCents)} off`;
