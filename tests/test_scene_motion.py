@@ -161,7 +161,7 @@ def test_a_start_at_which_two_overlap_is_refused():
     described = scene(ball("one"), ball("other", position=[0.015, 0, 0]), ground=None)
     with pytest.raises(UserError, match="'other' and object 'one' overlap by 5 mm"):
         moved(described)
-    with pytest.raises(UserError, match="object 'one' and the ground overlap by 10 mm") as refused:
+    with pytest.raises(UserError, match="object 'one' and the ground overlap by 1 cm") as refused:
         moved(scene(ball("one")))
     assert str(refused.value).endswith("with stands_on: ground, or at a height (z) of 0.01 m")
 
@@ -180,7 +180,7 @@ def test_a_bowl_that_overlaps_the_ground_a_little_is_lifted_and_rests(capsys):
     assert lifted == pytest.approx([0, 0, -lowest - 0.0417], abs=1e-7)
     # What is left, and what its weight presses it in by.
     assert np.abs(heights - heights[0]).max() < 2e-5
-    assert f"object 'bowl' by {1e3 * lifted[2]:.3g} mm" in capsys.readouterr().err
+    assert f"object 'bowl' from the ground by {1e3 * lifted[2]:.3g} mm" in capsys.readouterr().err
 
 
 def test_the_height_that_a_refusal_names_is_one_at_which_the_bowl_rests():
