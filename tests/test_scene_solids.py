@@ -267,7 +267,9 @@ def test_a_mesh_has_the_size_and_the_axis_up_that_it_is_given(tmp_path):
     hung = {up: body(mesh=bar, material="steel", count=0, size=0.2, up=up) for up in ("-y", "y")}
     bars = [each.shape.vertices * (1.0, -1.0, -1.0) for each in hung.values()]
     assert bars[0] == pytest.approx(hung["y"].shape.vertices, abs=1e-12)
-    with pytest.raises(UserError, match=r"up \(it\): found 'north', expected one of x, y, z, -x, -y, -z"):
+    with pytest.raises(
+        UserError, match=r"up \(it\): found 'north', expected one of x, y, z, -x, -y, -z"
+    ):
         body(mesh=bar, material="steel", up="north")
     plain = body(mesh=bar, material="steel", count=0, size=0.2, resolution=12)
     assert np.ptp(plain.shape.vertices, axis=0) == pytest.approx([0.2, 0.01, 0.05])
