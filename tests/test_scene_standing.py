@@ -99,3 +99,30 @@ def test_faults_are_told_before_modes_are_found(given, says, monkeypatch):
     monkeypatch.setattr(play, "with_modes", solved)
     with pytest.raises(UserError, match=says):
         play.perform(scene({**BOWL, "count": 20, **given}, seconds=0.1), 1, visible=False)
+
+
+def test_what_tips_on_its_parts_rests_before_time_begins():
+    """The bar's convex parts are off its surface by up to a tenth of a millimetre."""
+    bar = {"mesh": "builtin:bar", "material": "steel", "count": 0}
+    course = at_rest(
+        {**bar, "name": "low", "stands_on": "ground"},
+        {**bar, "name": "across", "rotation": [0.0, 0.0, 90.0], "stands_on": "low"},
+    )
+    assert np.abs(course.motion.rotations - course.motion.rotations[0]).max() < 1e-5
+
+
+def test_what_cannot_stay_moves_and_what_stands_beside_it_rests():
+    require_engine()
+    bar = {"name": "bar", "mesh": "builtin:bar", "material": "steel", "stands_on": "ground"}
+    slope = {"name": "slope", "mesh": "builtin:plate", "material": "steel", "fixed": True}
+    slope |= {"position": [1.0, 0.0, 0.2], "rotation": [0.0, 40.0, 0.0]}
+    rolls = ball("rolls", position=[1.0, 0.0, 0.0], stands_on="slope")
+    _, course = moved(scene({**bar, "count": 0}, {**slope, "count": 0}, rolls, seconds=0.3))
+    ways = np.linalg.norm(course.motion.positions - course.motion.positions[0], axis=2).max(axis=0)
+    assert ways[0] < 2e-5 and ways[2] > 0.05
+
+
+def test_what_stands_and_has_a_velocity_begins_with_it():
+    require_engine()
+    _, course = moved(scene(ball(stands_on="ground", velocity=[0.5, 0.0, 0.0]), seconds=0.1))
+    assert 0.03 < course.motion.positions[-1, 0, 0] < 0.05  # friction lets it roll

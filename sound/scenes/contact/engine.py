@@ -16,10 +16,11 @@ from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError, one_line
 from sound.scenes.bodies import Body
 from sound.scenes.contact.contacts import ContactLog, ContactPoints
+from sound.scenes.contact.settling import settle
 from sound.scenes.contact.standing import stood
 from sound.scenes.contact.start import start
 from sound.scenes.cylinder import Cylinder
-from sound.scenes.object_entry import Vector
+from sound.scenes.object_entry import ObjectEntry, Vector
 from sound.scenes.packages import scene_package
 from sound.scenes.performance import Motion
 from sound.scenes.scene import EngineEntry
@@ -77,8 +78,9 @@ def simulate(
 ) -> Course:
     """Simulate the motion of bodies for some seconds under gravity (3,) [m/s^2].
 
-    Those that stand on something are put there, see `sound.scenes.contact.standing`, and those that
-    overlap a little at the start are separated, see `sound.scenes.contact.start`.
+    Those that stand on something are put there and settle, see `sound.scenes.contact.standing` and
+    `sound.scenes.contact.settling`; those that overlap a little at the start are separated, see
+    `sound.scenes.contact.start`.
     Contacts are springs with dampers: a bounce takes `engine.contact_seconds` whatever the masses,
     and leaves the share of speed that the restitution says.  Bodies that lie still sleep.  Raises
     UserError if two bodies overlap much at the start, the simulation is unstable, or there are too
@@ -86,10 +88,14 @@ def simulate(
     """
     mujoco = loaded()
     model = _model(mujoco, bodies, engine, gravity, ground)
-    if any(body.entry.stands_on for body in bodies):
+    standing = [number for number, body in enumerate(bodies) if body.entry.stands_on]
+    if standing:
         bodies = stood(model, bodies, ground.height)
         model = _model(mujoco, bodies, engine, gravity, ground)
     data = mujoco.MjData(model)
+    still = [number for number in standing if not _is_pushed(bodies[number].entry)]
+    if still:
+        settle(data, bodies, still)
     moved = start(data, bodies, gravity, engine.contact_seconds)
     recorder = _Recorder(model, data, bodies)
     every = max(1, round(1.0 / (PICTURES_PER_SECOND * engine.step_seconds)))
@@ -105,6 +111,10 @@ def simulate(
         if step % every == 0:
             recorder.require_calm(step * engine.step_seconds)
     return recorder.course(every * engine.step_seconds, moved)
+
+
+def _is_pushed(entry: ObjectEntry) -> bool:
+    return any(entry.velocity) or any(entry.spin)
 
 
 def loaded() -> Any:
