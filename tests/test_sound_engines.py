@@ -262,6 +262,14 @@ def test_a_folder_or_link_in_the_place_of_a_file_is_told(folder, tmp_path, name,
     assert names_in(path) == before
 
 
+def test_a_file_in_the_place_of_the_folder_of_sounds_is_told(folder, tmp_path, refuses):
+    (tmp_path / "pan").mkdir()
+    (tmp_path / "pan" / "sounds").touch()
+    said = refuses(main, "export", folder / "pan.h5", "--out", f"{tmp_path / 'pan'}/", *FEW)
+    assert "sounds: is a file, expected a folder" in said
+    assert names_in(tmp_path / "pan") == {"sounds"}
+
+
 def test_a_folder_that_fails_leaves_nothing(folder, tmp_path, monkeypatch, refuses):
     def full(*_):
         raise OSError(28, "No space left on device")

@@ -9,10 +9,11 @@ import trimesh
 
 from solver.response.vertices import inward_normals
 from sound.clips.extraction import ModalSound
-from sound.project.design import Design, MaterialDamping
+from sound.project.design import HISTORY_TYPE, Design, MaterialDamping
 from sound.rendering.likeness import LIKE_DECIBELS, decay_seconds
 from sound.rendering.solid import SoundingSolid
 from sound.rendering.verdict import CANNOT, FAR_SHARE, LIKE, NEAR, judged, with_verdict
+from sound.rendering.verdict import clips_of as design_clips
 from sound.synthesis.sinusoids import damped_sinusoids
 from tests.small_design import small_design
 
@@ -195,16 +196,68 @@ def test_the_point_that_the_clip_sounds_like_is_advised(unit):
         ("budget", [5.0, 4.0, 3.0, 2.0], "the cost still falls"),
         ("budget", [5.0, 3.0, 2.99, 2.98], ""),
         ("met", [5.0, 4.0, 3.0], ""),
-        ("budget", [], "the cost still falls"),  # as the history of the design says
     ],
 )
 def test_to_search_on_is_advised_where_that_may_help(ended_by, costs, says):
-    design = own_sounds()
     checks = [{"cost": cost} for cost in costs]
-    design = replace(design, evidence={"ended_by": ended_by, "checks": checks})
-    wrong = with_targets(design, frequencies=1.06 * design.frequencies)
-    advice = judged(wrong, clips_of(design)).advice
+    advice = advice_after({"ended_by": ended_by, "checks": checks})
     assert ("search on" in advice) == bool(says) and says in advice
+
+
+@pytest.mark.parametrize(
+    ("costs", "says"),
+    [
+        ([9.0], "it had little time"),
+        (np.linspace(9.0, 1.0, 40), "the cost still falls"),
+        (np.concatenate([np.linspace(9.0, 1.0, 20), np.ones(20)]), ""),
+    ],
+)
+def test_a_search_without_checks_tells_by_its_own_history_whether_it_falls(costs, says):
+    """Of a former search for other targets, which had lower costs, it tells nothing."""
+    rows = [(0.1 * k, k + 1, 0.5, 0.5, 0.0, 0.0) for k in range(30)]
+    rows += [(3.0 + 0.1 * k, 31 + k, cost, cost, 0.0, 0.0) for k, cost in enumerate(costs)]
+    evidence = {"ended_by": "budget", "checks": [], "evaluations": len(costs)}
+    advice = advice_after(evidence, history=np.array(rows, HISTORY_TYPE))
+    assert ("search on" in advice) == bool(says) and says in advice
+
+
+def advice_after(evidence: dict, **changes) -> str:
+    """Advice on a design that is a semitone off."""
+    design = replace(own_sounds(), evidence=evidence, **changes)
+    wrong = with_targets(design, frequencies=1.06 * design.frequencies)
+    return judged(wrong, clips_of(design)).advice
+
+
+def test_modes_that_the_material_damps_otherwise_are_told():
+    design = own_sounds()
+    dampings = design.targets.dampings.copy()
+    dampings[3] *= 0.1
+    settings = {**design.settings, "damping": {"source": "material"}}
+    made = replace(design, damping=MaterialDamping(None, 0.0, dampings), settings=settings)
+    clips = clips_of(with_targets(design, amplitudes=design.targets.amplitudes[:, ::-1]))
+    verdict = judged(made, clips)
+    assert verdict.word != LIKE and "1 of 8 modes otherwise than the clips" in verdict.reason
+    assert "10.0 times slower" in verdict.reason and "{source: clips}" in verdict.advice
+
+
+def test_a_loud_partial_that_the_strike_does_not_push_is_told_to_be_faint():
+    design = own_sounds()
+    amplitudes = design.targets.amplitudes.copy()
+    faintest = int(np.argmin(amplitudes[0]))
+    amplitudes[0, faintest] = 10.0 * amplitudes[0].max()
+    loud = with_targets(design, amplitudes=amplitudes)
+    hertz = f"{design.frequencies[faintest]:.0f} Hz"
+    assert re.search(f"the mode at {hertz} is .* dB too faint", judged(loud, clips_of(loud)).reason)
+
+
+def test_partials_that_are_left_out_are_no_part_of_the_clip(tmp_path, monkeypatch):
+    design = own_sounds()
+    (clip, _) = clips_of(design)
+    monkeypatch.setattr("sound.rendering.verdict.extract_file", lambda *_: clip)
+    gone = float(clip.frequencies[2])
+    targets = [{"clip": "a.wav", "without": [gone]}, {"clip": "b.wav"}]
+    first, second = design_clips(replace(design, settings={"targets": targets}))
+    assert gone not in first.frequencies and gone in second.frequencies
 
 
 def test_a_clip_that_is_mostly_no_strike_is_told():

@@ -133,8 +133,8 @@ def target_of(path: Path) -> Path:
 
 
 def kind_of_mode(mode: int) -> str:
-    """What something is that is no regular file, in a word: "folder", "link", "pipe"."""
-    return next(name for is_such, name in _OTHER_KINDS if is_such(mode))
+    """What something is, in a word: "folder", "link", "pipe"; "file" if it is a regular one."""
+    return next((name for is_such, name in _OTHER_KINDS if is_such(mode)), "file")
 
 
 def by_stem(paths: Iterable[str | Path]) -> dict[str, str]:

@@ -45,6 +45,8 @@ FAR_DAMPINGS = 1.5
 """Factor by which the dampings of a material are, in the median, far from those of the clips."""
 STIFFEST, SOFTEST = 1.2e12, 1e6
 """Young's moduli [Pa] of diamond and of soft rubber."""
+ERASE = "\x1b[2K"
+"""Erases the line of a terminal."""
 SHOWN_EVERY = 1.0
 """Time between two progress lines on a terminal [s]."""
 
@@ -125,11 +127,13 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     elif not options.watch:
         count = "1 process" if problem.workers == 1 else f"{problem.workers} processes"
         say(f"searching on {count}, {_budget(project.optimiser)}")
-    show = _SearchProgress().show
+    progress = _SearchProgress()
     if options.watch:
-        result = design_on(edited, problem, initial, out, show)
+        result = design_on(edited, problem, initial, out, progress.show)
+        progress.end()
     else:
-        result = optimise(problem, initial, lambda each: write_design(out, each), show)
+        result = optimise(problem, initial, lambda each: write_design(out, each), progress.show)
+        progress.end()
         write_design(out, result)
         result = with_verdict(result)
         write_design(out, result)
@@ -156,7 +160,7 @@ def _budget(optimiser: OptimiserSettings, more: str = "") -> str:
     if optimiser.seconds is not None:
         limits.append(f"{optimiser.seconds:g} s of processor time")
     if optimiser.evaluations is not None:
-        limits.append(f"{optimiser.evaluations:,} evaluations")
+        limits.append(counted(optimiser.evaluations, "evaluation"))
     return f"for {' or '.join(limits)}{more}" if limits else "until it is interrupted"
 
 
@@ -176,7 +180,7 @@ class _SearchProgress:
         entry, first = search.history[-1], search.history[0]
         cost = entry.cost
         text = (
-            f"{search.own_seconds:6.1f} s  {search.own_evaluations:5,} evaluations  "
+            f"{search.own_seconds:6.1f} s  {counted(search.own_evaluations, 'evaluation')}  "
             f"cost {cost.total:9.4g} ({fall(first.cost.total, cost.total):.1%} less)  "
             f"frequencies {cost.frequency:8.3g}  amplitudes {cost.amplitude:8.3g}"
         )
@@ -185,7 +189,15 @@ class _SearchProgress:
             text += (
                 f"  rms {best.coarse_rms_cents:.1f} cents coarse, {best.fine_rms_cents:.1f} fine"
             )
-        say(text, end="\r" if self._terminal else "\n")
+        if self._terminal:
+            say(f"{ERASE}{text}", end="\r")
+        else:
+            say(text)
+
+    def end(self) -> None:
+        """Erase the line on a terminal."""
+        if self._terminal:
+            say(ERASE, end="\r")
 
 
 def summarise(design: Design) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from carillon.command_line.logs import warn_once
 from carillon.errors import UserError
 from sound.clips.extraction import ModalSound, oddities, remarks
 from sound.clips.files import extract_file
+from sound.clips.targets import without_modes
 from sound.design.pitch import cents
 from sound.project.design import Design
 from sound.rendering.likeness import (
@@ -114,12 +115,15 @@ def with_verdict(design: Design) -> Design:
 
 
 def clips_of(design: Design) -> list[ModalSound]:
-    """The clips that a design was made for, as they were searched.
+    """The clips that a design was made for, as they were searched, without what was left out.
 
     Raises UserError if one is not there any more.
     """
     return [
-        extract_file(each["clip"], each.get("modes"), False, each.get("allow_clipped", False))
+        without_modes(
+            extract_file(each["clip"], each.get("modes"), False, each.get("allow_clipped", False)),
+            each.get("without") or (),
+        )
         for each in design.settings["targets"]
     ]
 

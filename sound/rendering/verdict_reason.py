@@ -15,18 +15,22 @@ from sound.rendering.likeness import LIKE_CENTS, LIKE_RATIO, Likeness, furthest_
 from sound.rendering.listening import Listening
 from sound.rendering.solid import SoundingSolid
 
-LOUD_DECIBELS = 12.0
-"""Error of a partial's level [dB] that is told."""
+LOUD_DECIBELS, MOST_DECIBELS = 12.0, 60.0
+"""Error of a partial's level [dB] that is told, and level below the loudest that counts as none."""
 GAIN = 0.05
 """Share of the cost that the last part of a search takes off if it gets on."""
 FEW_CHECKS = 3
 """Least number of checks on the fine solid by which a search tells whether its cost still falls."""
+FEW_EVALUATIONS, TIMES = 16, 5
+"""Least number of evaluations by which a search without checks tells it, and number of times at
+which its cost is looked at: the last two are the last half of the search."""
 FAR_CENTS = 50.0
 """Distance of a partial [cents] that is told."""
 MOSTLY = 0.5
 """Share of a clip's energy in what is no mode, beyond which this is told first."""
 MUCH = 0.2
 """Share of the loudness in partials without a mode, beyond which this is told first."""
+CLIPS_DAMPINGS = "take the dampings of the clips (damping: {source: clips})"
 ANOTHER_SOLID = "take another solid"
 
 
@@ -45,7 +49,7 @@ class Judged:
 
 def reason_of(judged: Judged) -> tuple[str, str]:
     """What stands most between a design and its clips, and one suggestion."""
-    for find in (_of_clip, _much_left_out, _far, _off, _loud, _decay, _left_out):
+    for find in (_of_clip, _much_left_out, _far, _off, _damped, _level, _decay, _left_out):
         found = find(judged)
         if found is not None:
             return found
@@ -132,20 +136,28 @@ def _off(judged: Judged) -> tuple[str, str] | None:
 
 def _search_on(design: Design) -> str:
     """Advice to search on, where a search ended before it had found what it can."""
-    checks = [each["cost"] for each in design.evidence.get("checks", [])]
-    costs = np.minimum.accumulate(checks)
     if design.evidence.get("ended_by") not in (BUDGET, INTERRUPT):
         return ""
-    if 0 < len(costs) < FEW_CHECKS:
+    checks = [each["cost"] for each in design.evidence.get("checks", [])]
+    costs = np.minimum.accumulate(checks or _own_costs(design))
+    if len(costs) < FEW_CHECKS:
         return "search on, it had little time"
-    if not len(costs):  # The search was on the fine solid itself.
-        history = np.minimum.accumulate(design.history["cost"])
-        costs = history[[(len(history) - 1) // 2, -1]]
-    return (
-        "search on, the cost still falls"
-        if costs[-1] < (1.0 - GAIN) * costs[-FEW_CHECKS:][0]
-        else ""
-    )
+    falls = costs[-1] < (1.0 - GAIN) * costs[-FEW_CHECKS]
+    return "search on, the cost still falls" if falls else ""
+
+
+def _own_costs(design: Design) -> list[float]:
+    """Costs at some times of the last search, evenly over its evaluations: those of a search
+    without checks.
+
+    Former ones may have had other targets.
+    """
+    made, costs = design.history["evaluations"], design.history["cost"]
+    own = int(design.evidence["evaluations"])
+    if own < FEW_EVALUATIONS:
+        return []
+    at = np.linspace(made[-1] - own + 1, made[-1], TIMES)
+    return [float(costs[row]) for row in np.minimum(np.searchsorted(made, at), len(made) - 1)]
 
 
 def _without(hertz: Array, partials: int) -> str:
@@ -155,23 +167,49 @@ def _without(hertz: Array, partials: int) -> str:
     return f"leave these out (without: [{listed}]), or {ANOTHER_SOLID}"
 
 
-def _loud(judged: Judged) -> tuple[str, str] | None:
-    """A mode that is too loud where a target is struck."""
+def _damped(judged: Judged) -> tuple[str, str] | None:
+    """Modes that the material damps otherwise than the clips."""
+    targets, solid = judged.design.targets, judged.solid
+    if judged.design.settings.get("damping", {}).get("source", "clips") != "material":
+        return None
+    ratios = np.maximum(solid.dampings, 1e-9) / targets.dampings
+    far = np.flatnonzero(np.maximum(ratios, 1.0 / ratios) > LIKE_RATIO)
+    if not len(far):
+        return None
+    worst = far[np.argmax(np.abs(np.log(ratios[far])))]
+    times = max(ratios[worst], 1.0 / ratios[worst])
+    side = "slower" if ratios[worst] < 1.0 else "faster"
+    return (
+        f"the material damps {len(far)} of {counted(len(ratios), 'mode')} otherwise than the "
+        f"clips, that at {solid.frequencies[worst]:.0f} Hz {times:.1f} times {side}",
+        CLIPS_DAMPINGS,
+    )
+
+
+def _level(judged: Judged) -> tuple[str, str] | None:
+    """The mode whose share of the energy is furthest from the clip's where a target is struck."""
     strikes, targets = judged.design.strikes, judged.design.targets
     positions = np.array([strike.position for strike in strikes])
     inward = np.array([strike.inward for strike in strikes])
-    levels = judged.solid.amplitudes(positions, inward)
-    own = 20.0 * np.log10(np.maximum(levels / levels.max(axis=1, keepdims=True), 1e-9))
-    aims = targets.amplitudes / targets.amplitudes.max(axis=1, keepdims=True)
-    wrong = np.where(aims > 0.0, own - 20.0 * np.log10(np.maximum(aims, 1e-9)), 0.0)
-    point, mode = divmod(int(np.argmax(wrong)), wrong.shape[1])
-    if wrong[point, mode] <= LOUD_DECIBELS:
+    which = targets.sounding
+    own = _energy_shares(judged.solid.amplitudes(positions, inward)[:, which])
+    aims = _energy_shares(targets.amplitudes[:, which])
+    point, partial = divmod(int(np.argmax(np.abs(own - aims))), len(which))
+    least = 10.0 ** (-MOST_DECIBELS / 10.0)
+    ratio = max(own[point, partial], least) / max(aims[point, partial], least)
+    wrong = 10.0 * np.log10(ratio)
+    if abs(wrong) <= LOUD_DECIBELS:
         return None
     return (
-        f"the mode at {judged.solid.frequencies[mode]:.0f} Hz is {wrong[point, mode]:.0f} dB too "
-        f"loud where {strikes[point].name} is struck",
+        f"the mode at {judged.solid.frequencies[which[partial]]:.0f} Hz is {abs(wrong):.0f} dB too "
+        f"{'loud' if wrong > 0.0 else 'faint'} where {strikes[point].name} is struck",
         _elsewhere(judged, judged.likeness[point]),
     )
+
+
+def _energy_shares(amplitudes: Array) -> Array:
+    squares = amplitudes**2
+    return np.asarray(squares / np.maximum(squares.sum(axis=1, keepdims=True), 1e-300))
 
 
 def _decay(judged: Judged) -> tuple[str, str] | None:
@@ -179,7 +217,7 @@ def _decay(judged: Judged) -> tuple[str, str] | None:
     if not told:
         return None
     if judged.design.settings.get("damping", {}).get("source", "clips") == "material":
-        return told, "take the dampings of the clips (damping: {source: clips})"
+        return told, CLIPS_DAMPINGS
     # Each partial dies away as the clip's: another balance of them makes the difference.
     return told, _elsewhere(judged, furthest_decay(judged.likeness))
 

@@ -12,6 +12,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
@@ -241,8 +242,9 @@ def _sizes(extents: dict[str, list[float]]) -> str:
 def _sentence(summary: dict[str, Any], level: SoundLevel | None) -> str:
     files = [name for name in summary["files"].values() if name is not None]
     return (
-        f"{', '.join(files)}: {summary['seconds']:.4g} s, {summary['objects']} objects with "
-        f"{summary['modes']} modes, {summary['impacts']:,} impacts; full scale is "
+        f"{', '.join(files)}: {summary['seconds']:.4g} s, "
+        f"{counted(summary['objects'], 'object')} with {counted(summary['modes'], 'mode')}, "
+        f"{counted(summary['impacts'], 'impact')}; full scale is "
         f"{summary['full_scale_pascal']:.3g} Pa{'' if level is None else f'; {level.in_words()}'}\n"
         f"sizes: {_sizes(summary['extents_m'])}"
     )
