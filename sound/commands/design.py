@@ -126,7 +126,7 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         )
     elif not options.watch:
         count = "1 process" if problem.workers == 1 else f"{problem.workers} processes"
-        say(f"searching on {count}, {_budget(project.optimiser)}")
+        say(f"searching on {count}, {_budget(project.optimiser)}", sys.stderr.isatty())
     progress = _SearchProgress()
     if options.watch:
         result = design_on(edited, problem, initial, out, progress.show)
