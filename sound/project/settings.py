@@ -74,7 +74,9 @@ class MaterialSettings:
         1e9, "modulus of the uniform material that the search starts from [Pa]"
     )
     dimensions: Annotated[int, between(2, 10_000)] = option(
-        48, "eigenvectors of the volumetric Laplacian that the field is made from [1]"
+        48,
+        "smooth patterns over the solid that the field is made from, eigenvectors of the "
+        "volumetric Laplacian [1]",
     )
     law: Annotated[str, OneOf("linear", "exponential")] = option(
         "exponential", "how the field follows from their sum; the exponential one reaches further"
