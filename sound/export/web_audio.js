@@ -111,10 +111,10 @@ export function render(point, seconds, rate, { gain = model.gain, ...how } = {})
  * time of the context [s].
  *
  * @param {BaseAudioContext} context
- * @param {object} [how]
- * @param {{point: number | string, strength?: number, contactSeconds?: number, at?: number}[]} [how.strikes] Those
+ * @param {object} [settings]
+ * @param {{point: number | string, strength?: number, contactSeconds?: number, at?: number}[]} [settings.strikes] Those
  *   that are known from the beginning; a context that renders offline takes no others in time.
- * @param {number} [how.gain] Factor on the samples.
+ * @param {number} [settings.gain] Factor on the samples.
  * @returns {Promise<AudioWorkletNode & {strike: (point: number | string, how?: object) => void}>}
  */
 export async function createSolid(context, settings = {}) {
