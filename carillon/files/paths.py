@@ -133,7 +133,7 @@ def target_of(path: Path) -> Path:
 
 
 def kind_of_mode(mode: int) -> str:
-    """What something is, in a word: "folder", "link", "pipe"; "file" if it is a regular one."""
+    """Kind of a file by its mode, in a word: "folder", "link", "pipe", or "file"."""
     return next((name for is_such, name in _OTHER_KINDS if is_such(mode)), "file")
 
 

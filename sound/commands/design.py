@@ -40,7 +40,7 @@ _ENDINGS = {
     "met": "; ended early: its frequencies are met, and the cost falls no more",
     "interrupt": "; ended on request",
 }
-"""What is told of the ending of a search; nothing of one that used up its budget."""
+"""End of the summary's first line by what ended a search, empty if that was its budget."""
 FAR_DAMPINGS = 1.5
 """Factor by which the dampings of a material are, in the median, far from those of the clips."""
 STIFFEST, SOFTEST = 1.2e12, 1e6

@@ -25,8 +25,8 @@ ENDLESS_SECONDS = 60.0
 
 
 UNDER_WAY, BUDGET, INTERRUPT, MET = "", "budget", "interrupt", "met"
-"""What ended a search: nothing yet; its budget; someone; that its frequencies are met and its cost
-falls no more."""
+"""Endings of a search: none yet, its budget is used up, someone interrupted it, or its frequencies
+are met and its cost falls no more."""
 
 
 class BudgetSpentError(Exception):

@@ -18,7 +18,7 @@ SOUNDS = "sounds"
 TABLE = f"{SOUNDS}.json"
 """Name of the table that lists the files of an export."""
 FORMAT = "carillon sound set 1"
-"""What the table says that it is."""
+"""Name of the format of the table of sounds, in its key `format`."""
 LARGEST_TABLE = 64 * 2**20
 """Length [bytes] of a table that is read."""
 
@@ -77,7 +77,7 @@ def _former(folder: HeldFolder) -> list[str]:
 
 
 def _removed(folder: HeldFolder, files: Sequence[str]) -> list[str]:
-    """Those of the files that were there, which are removed."""
+    """Remove files of a folder; the names of those that it had."""
     removed = []
     for parent, names in _by_parent(files).items():
         with _inside(folder, parent) as inner:
