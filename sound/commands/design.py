@@ -130,10 +130,10 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     progress = _SearchProgress()
     if options.watch:
         result = design_on(edited, problem, initial, out, progress.show)
-        progress.end()
     else:
         result = optimise(problem, initial, lambda each: write_design(out, each), progress.show)
-        progress.end()
+    progress.end()
+    if not options.watch:
         write_design(out, result)
         result = with_verdict(result)
         write_design(out, result)

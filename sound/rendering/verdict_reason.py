@@ -46,6 +46,12 @@ class Judged:
     cents: Array
     likeness: Sequence[Likeness]
 
+    @property
+    def has_own_dampings(self) -> bool:
+        """Whether the dampings that sound are those of the material, not of the clips."""
+        source: str = self.design.settings.get("damping", {}).get("source", "clips")
+        return source == "material"
+
 
 def reason_of(judged: Judged) -> tuple[str, str]:
     """What stands most between a design and its clips, and one suggestion."""
@@ -170,7 +176,7 @@ def _without(hertz: Array, partials: int) -> str:
 def _damped(judged: Judged) -> tuple[str, str] | None:
     """Modes that the material damps otherwise than the clips."""
     targets, solid = judged.design.targets, judged.solid
-    if judged.design.settings.get("damping", {}).get("source", "clips") != "material":
+    if not judged.has_own_dampings:
         return None
     ratios = np.maximum(solid.dampings, 1e-9) / targets.dampings
     far = np.flatnonzero(np.maximum(ratios, 1.0 / ratios) > LIKE_RATIO)
@@ -216,7 +222,7 @@ def _decay(judged: Judged) -> tuple[str, str] | None:
     told = rings(judged.likeness)
     if not told:
         return None
-    if judged.design.settings.get("damping", {}).get("source", "clips") == "material":
+    if judged.has_own_dampings:
         return told, CLIPS_DAMPINGS
     # Each partial dies away as the clip's: another balance of them makes the difference.
     return told, _elsewhere(judged, furthest_decay(judged.likeness))
