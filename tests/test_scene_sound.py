@@ -10,17 +10,17 @@ from carillon.errors import UserError
 from sound.export.scene_gltf import write_scene_gltf
 from sound.levels import HEARD
 from sound.project.design_file import write_design
+from sound.radiation.air import SOUND_SPEED
 from sound.rendering.render import Hit, render
 from sound.scenes.audible.contact_damping import dashpot
 from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
-from sound.scenes.audible.radiation import SOUND_SPEED
 from sound.scenes.audible.rough_contact import relative_force, trace
 from sound.scenes.audible.sustained_contact import octave_heights, profile
 from sound.scenes.bodies import bodies_of
 from sound.scenes.hertz import stiffness
 from sound.scenes.performance import Motion
 from sound.scenes.playing.play import perform
-from sound.synthesis.driven import BLOCK, Excitation, ring
+from sound.synthesis.driven import BLOCK, Excitation, Gains, ring
 from sound.synthesis.sinusoids import Bank
 from sound.synthesis.sinusoids import ring as ring_bank
 from studio.scene.page import write_scene_page
@@ -77,7 +77,7 @@ def test_modes_ring_as_the_bank_has_them_from_strike_to_strike():
     amplitudes = np.array([[1.0, 0.5, 1.0], [0.3, 2.0, 0.0], [1.0, 1.0, 1.0]])
     firsts = np.ceil(seconds * RATE).astype(np.int64)
     act = _struck(firsts, firsts - seconds * RATE, np.zeros(3), amplitudes)
-    found = ring(hertz, dampings, np.ones((3, 1)), act, RATE // 2, RATE)[:, 0]
+    found = ring(hertz, dampings, Gains.constant(np.ones(3)), act, RATE // 2, RATE)
     expected = ring_bank(Bank(hertz, dampings, RATE), list(zip(seconds, amplitudes)), RATE // 2)
     assert decibels(found, expected) < -200.0
 
@@ -87,8 +87,12 @@ def test_what_a_body_lies_on_damps_it_by_as_much_as_is_told():
     act = _struck(np.zeros(1, np.int64), np.zeros(1), np.zeros(1), np.ones((1, 1)))
     blocks = np.arange(-(-count // BLOCK))
     damped = replace(act, damped=blocks, dampings=np.full((len(blocks), 1), added))
-    found = ring(np.array([800.0]), np.array([5.0]), np.ones((1, 1)), damped, count, RATE)
-    expected = ring(np.array([800.0]), np.array([5.0 + added]), np.ones((1, 1)), act, count, RATE)
+    found = ring(
+        np.array([800.0]), np.array([5.0]), Gains.constant(np.ones(1)), damped, count, RATE
+    )
+    expected = ring(
+        np.array([800.0]), np.array([5.0 + added]), Gains.constant(np.ones(1)), act, count, RATE
+    )
     assert decibels(found, expected) < -200.0
 
 
@@ -103,7 +107,9 @@ def test_a_force_that_lasts_moves_a_mode_as_its_equation_of_motion_says():
         courses=force.reshape(-1, BLOCK),
         pushes=np.ones((400, 1)),
     )
-    found = ring(np.array([hertz]), np.array([damping]), np.ones((1, 1)), act, count, RATE)[:, 0]
+    found = ring(
+        np.array([hertz]), np.array([damping]), Gains.constant(np.ones(1)), act, count, RATE
+    )
     # x'' + 2 d x' + (w^2 + d^2) x = w f; the steady part, when the rest has decayed.
     omega, pushed = 2 * np.pi * hertz, 2 * np.pi * drive
     expected = omega / abs(omega**2 + damping**2 - pushed**2 + 2j * damping * pushed)

@@ -69,10 +69,12 @@ class SoundEntry:
         "sound pressure of full scale [Pa]; auto lets the loudest sample just reach it, if that is "
         "not below the threshold of hearing (2e-5 Pa)",
     )
-    radiation: bool = option(
+    radiation: bool | Literal["boundary-elements"] = option(
         True,
-        "whether modes and the motion of the whole body are heard as they move the air; without, "
-        "modes are as loud as they are struck, as by carillon render",
+        "whether modes and the motion of the whole body are heard as they move the air, a solid "
+        "as a sphere of its surface, or by boundary-elements as the solid that it is, which takes "
+        "minutes once a solid; without, modes are as loud as they are struck, as by carillon "
+        "render",
     )
     space: bool = option(
         True,

@@ -7,11 +7,12 @@ computed in blocks, within which the damping is constant, for all modes side by 
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Self
 
 import numba
 import numpy as np
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array, Complex, Index
 from solver.response.response import half_sine
 from sound.synthesis.sinusoids import sampled_exponents
 
@@ -45,11 +46,27 @@ class Excitation:
     modes."""
 
 
+@dataclass(frozen=True)
+class Gains:
+    """Factors of the K modes in a sound: complex `values` (T, K) at ascending `frames` (T,)
+    [samples], linear between them and constant beyond.
+
+    A mode x of the gain g is heard as Im g x.
+    """
+
+    frames: Array
+    values: Complex
+
+    @classmethod
+    def constant(cls, values: Array) -> Self:
+        """Gains (K,) that do not change."""
+        return cls(np.zeros(1), np.asarray(values, dtype=complex)[None])
+
+
 def ring(
-    frequencies: Array, dampings: Array, gains: Array, act: Excitation, count: int, rate: int
+    frequencies: Array, dampings: Array, gains: Gains, act: Excitation, count: int, rate: int
 ) -> Array:
-    """Samples (count, C) of modes that an excitation drives, with gains (K, C) in each of C
-    channels.
+    """Samples (count,) of modes that an excitation drives, added up with their gains.
 
     Modes with `frequencies` (K,) [Hz] from half the rate [Hz] on stay silent; `dampings` (K,) are
     in 1/s.
@@ -61,13 +78,15 @@ def ring(
     ends = np.cumsum(lengths)
     pushes = act.pushes * heard / rate
     loudest = max(np.abs(begun).max(initial=0.0), np.abs(pushes).max(initial=0.0))
-    samples = np.zeros((count, gains.shape[1]))
+    samples = np.zeros(count)
     turns = np.exp(exponents)
     _ring(
         samples,
         turns.real.copy(),
         turns.imag.copy(),
-        np.ascontiguousarray(gains, dtype=float),
+        np.ascontiguousarray(gains.frames, dtype=float),
+        np.ascontiguousarray(gains.values.real),
+        np.ascontiguousarray(gains.values.imag),
         act.firsts,
         ends - lengths,
         lengths,
@@ -99,7 +118,9 @@ def _ring(  # type: ignore[no-untyped-def]
     samples,
     turn_re,
     turn_im,
-    gains,
+    frames,
+    gains_re,
+    gains_im,
     firsts,
     offsets,
     lengths,
@@ -117,9 +138,9 @@ def _ring(  # type: ignore[no-untyped-def]
     n_modes = len(turn_re)
     re, im = np.zeros(n_modes), np.zeros(n_modes)
     now_re, now_im = turn_re.copy(), turn_im.copy()
-    course = np.zeros((BLOCK, n_modes))
     force_re, force_im = np.zeros((BLOCK, n_modes)), np.zeros((BLOCK, n_modes))
     oldest, next_press, next_damped = 0, 0, 0
+    frame, last = 0, len(frames) - 1
     ringing = False
     for begin in range(0, n_samples, BLOCK):
         size = min(BLOCK, n_samples - begin)
@@ -168,12 +189,22 @@ def _ring(  # type: ignore[no-untyped-def]
                 for k in range(n_modes):
                     re[k] += force_re[n, k]
                     im[k] += force_im[n, k]
+            place = begin + n
+            while frame < last and frames[frame + 1] <= place:
+                frame += 1
+            then = min(frame + 1, last)
+            share = 0.0
+            if then > frame:
+                share = max(0.0, (place - frames[frame]) / (frames[then] - frames[frame]))
+            total = 0.0
             for k in range(n_modes):
-                course[n, k] = im[k]
+                gain_re = gains_re[frame, k] + share * (gains_re[then, k] - gains_re[frame, k])
+                gain_im = gains_im[frame, k] + share * (gains_im[then, k] - gains_im[frame, k])
+                total += gain_re * im[k] + gain_im * re[k]
                 turned = re[k] * now_re[k] - im[k] * now_im[k]
                 im[k] = re[k] * now_im[k] + im[k] * now_re[k]
                 re[k] = turned
-        samples[begin : begin + size] = np.dot(course[:size], gains)
+            samples[place] = total
         ringing = False
         for k in range(n_modes):
             if re[k] * re[k] + im[k] * im[k] > silent:

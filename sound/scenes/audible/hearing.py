@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from carillon.arrays import Array
-from sound.scenes.audible.radiation import SOUND_SPEED
+from sound.radiation.air import SOUND_SPEED
 from sound.scenes.performance import Motion
 
 HEAD_RADIUS = 0.0875

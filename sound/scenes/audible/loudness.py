@@ -13,53 +13,55 @@ the pressure rho c v / (k r |h_1'(ka)|) of a sphere that moves at v = A / s beco
 """
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve, lfilter
 
 from carillon.arrays import Array
+from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
+from sound.radiation.directivity import Directivity
+from sound.radiation.modes_directivity import modes_directivity
+from sound.radiation.sphere import radiated
 from sound.scenes.audible.excitation import mean_places
-from sound.scenes.audible.radiation import AIR_DENSITY, SOUND_SPEED, Radiation, radiated
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import HertzImpact
 from sound.scenes.performance import Voice
 from sound.synthesis.driven import pulse
 
-CHANNELS = 4
-"""Number of channels of a body: one equal in all directions, and one along each of its axes."""
 MATCHED_HERTZ = 10_000.0
 """Frequency [Hz] at which the filter has the magnitude of the sphere's response; a quarter of the
 sampling rate if that is less."""
 
 
-def mode_gains(body: Body, radiation: bool) -> Array:
-    """Pressure times distance (K, CHANNELS) [Pa m] per amplitude of a body's modes, at 0 dB.
+def mode_directivity(body: Body, radiation: bool | Literal["boundary-elements"]) -> Directivity:
+    """Directivity [Pa m] of a body's modes per amplitude, at 0 dB.
 
     Each mode of a body without clips is as loud as its surface moves the air.  The modes of a
-    design are as loud beside each other as its clips say; together they are as loud as their
-    surface moves the air, on average over the targets' points.  Without `radiation` gains are 1.
+    design are as loud beside each other as its clips say, alike in all directions; together they
+    are as loud as their surface moves the air, on average over the targets' points.  Without
+    `radiation` all are 1.  Raises UserError if boundary elements are not installed.
     """
     assert body.solid is not None
-    gains = np.zeros((len(body.solid.frequencies), CHANNELS))
-    gains[:, 0] = 1.0
-    if radiation:
-        air = radiated(body.motion(body.shape.vertices), body.shape, body.solid.frequencies)
-        if body.listening is None:
-            gains = np.column_stack([air.monopoles, air.dipoles])
-        else:
-            gains *= _clip_factor(body, air)
-    return gains
+    frequencies, shape = body.solid.frequencies, body.shape
+    alike = Directivity.uniform(np.ones(len(frequencies)))
+    if not radiation:
+        return alike
+    if radiation == "boundary-elements":
+        air = modes_directivity(body.entry.name, shape, body.motion, frequencies)
+    else:
+        air = radiated(body.motion(shape.vertices), shape, frequencies).directivity
+    return air if body.listening is None else alike.times(_clip_factor(body, air))
 
 
-def voice(body: Body, gains: Array) -> Voice:
-    """The sound of a body struck by hand, from the gains of its modes [full scale m]."""
+def voice(body: Body, directivity: Directivity) -> Voice:
+    """The sound of a body struck by hand, from the directivity of its modes [full scale m]."""
     assert body.solid is not None
     shape = body.shape
     pushed = np.einsum("vik,vi->vk", body.motion(shape.vertices), shape.inward)
     struck = np.abs(pushed) * body.gains(shape.vertices)
-    loud = np.sqrt(gains[:, 0] ** 2 + (gains[:, 1:] ** 2).sum(axis=1) / 3.0)
-    return Voice(body.solid.frequencies, body.solid.dampings, struck * loud)
+    return Voice(body.solid.frequencies, body.solid.dampings, struck * directivity.rms)
 
 
 def click(number: int, body: Body, impacts: Sequence[HertzImpact], count: int, rate: int) -> Array:
@@ -115,7 +117,7 @@ def clip_noise(
     return total
 
 
-def _clip_factor(body: Body, air: Radiation) -> float:
+def _clip_factor(body: Body, air: Directivity) -> float:
     """Factor that gives a design's modes the energy with which its surface moves the air."""
     assert body.solid is not None and body.listening is not None
     solid, listening = body.solid, body.listening
@@ -123,9 +125,8 @@ def _clip_factor(body: Body, air: Radiation) -> float:
     near = [int(np.argmin(np.linalg.norm(places - at, axis=1))) for at in listening.positions]
     inward = body.along_solid(body.shape.inward[near])
     amplitudes = solid.amplitudes(listening.positions, inward)
-    moved = air.monopoles**2 + (air.dipoles**2).sum(axis=1) / 3.0
     ringing = amplitudes**2 / np.maximum(solid.dampings, 1e-3)
-    own = (ringing * moved).sum()
+    own = (ringing * air.rms**2).sum()
     clips = (ringing * listening.gains[:, None] ** 2).sum()
     return float(np.sqrt(own / clips)) if clips > 0.0 else 1.0
 

@@ -17,7 +17,7 @@ from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.contact.engine import GroundPlane, simulate
 from sound.scenes.contact.impacts import Touch, split_impacts
 from sound.scenes.performance import Appearance, Camera, Motion, Performance, Picture
-from sound.scenes.playing.scene_sound import SceneSound, gains_of, sustained_forces
+from sound.scenes.playing.scene_sound import SceneSound, directivities_of, sustained_forces
 from sound.scenes.scene import CameraEntry, ListenerEntry, Scene
 
 FROM = np.array([0.25, -1.0, 0.42]) / np.linalg.norm([0.25, -1.0, 0.42])
@@ -75,7 +75,7 @@ def perform(
         impacts,
         contacts,
         sustained_forces(contacts, seconds, engine, settings.rate, scene.seed, threads),
-        gains_of(bodies, settings.radiation, threads),
+        directivities_of(bodies, settings.radiation, threads),
         head_of(scene.listener, camera),
         settings,
         engine,
@@ -95,8 +95,8 @@ def perform(
     sound, fade = faded(sound, settings.rate, 0.0 if raw else None)
     clock.begin("voices")
     voices = [
-        None if body.solid is None else voice(body, scale * gains)
-        for body, gains in zip(bodies, player.gains)
+        None if directivity is None else voice(body, directivity.times(scale))
+        for body, directivity in zip(bodies, player.directivities)
     ]
     clock.end()
     surfaces = [

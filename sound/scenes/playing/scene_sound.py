@@ -2,21 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from carillon.arrays import Array
 from carillon.processes.threads import in_parallel
+from sound.radiation.directivity import Directivity
 from sound.scenes.audible.contact_damping import rests_of
 from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, along, heard, towards
-from sound.scenes.audible.loudness import CHANNELS, click, clip_noise, mode_gains
+from sound.scenes.audible.loudness import click, clip_noise, mode_directivity
 from sound.scenes.audible.sustained_contact import SustainedForce, sustained_force
 from sound.scenes.bodies import Body
 from sound.scenes.contact.engine import Course
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact
 from sound.scenes.scene import EngineEntry, SoundEntry
-from sound.synthesis.driven import ring
+from sound.synthesis.driven import Gains, ring
 
 AT_ONCE = 16
 """Number of bodies whose sounds are held in memory before they are added up."""
@@ -26,8 +28,8 @@ AT_ONCE = 16
 class SceneSound:
     """The sound of a scene at the listener's head, body by body, of `count` samples.
 
-    `impacts`, `contacts` by pairs and sustained `forces` are those of the whole scene; `gains` has
-    an array (K, CHANNELS) [Pa m] for the modes of each body.
+    `impacts`, `contacts` by pairs and sustained `forces` are those of the whole scene;
+    `directivities` [Pa m] are those of each body's modes, None of a silent one.
     """
 
     bodies: Sequence[Body]
@@ -35,7 +37,7 @@ class SceneSound:
     impacts: Sequence[HertzImpact]
     contacts: Sequence[SustainedContact]
     forces: Sequence[SustainedForce]
-    gains: Sequence[Array]
+    directivities: Sequence[Directivity | None]
     head: Head
     settings: SoundEntry
     engine: EngineEntry
@@ -66,24 +68,28 @@ class SceneSound:
         total = np.zeros(count)
         if settings.radiation:
             total += along(click(number, body, impacts, count, rate), frames, directions)
-        if body.solid is None:
+        directivity = self.directivities[number]
+        if directivity is None:
             return total
-        modes = self._modes(number, body, impacts)
-        total += modes[:, 0]
-        if self.gains[number][:, 1:].any():
+        if directivity.is_uniform:
+            frames, directions = frames[:1], directions[:1]
+        else:
             from scipy.spatial.transform import Rotation
 
             quaternions = motion.rotations[:, number][:, [1, 2, 3, 0]]
             rotations = Rotation.from_quat(quaternions).as_matrix()
-            turned = np.einsum("tij,ti->tj", rotations, directions)
-            total += along(modes[:, 1:], frames, turned)
+            directions = np.einsum("tij,ti->tj", rotations, directions)
+        gains = directivity.towards(directions)
+        total += self._modes(number, body, impacts, Gains(frames, gains))
         if body.listening is not None and settings.noise:
-            gain = float(self.gains[number][0, 0])
+            gain = float(gains[0, 0].real)
             total += clip_noise(number, body, impacts, gain, count, rate)
         return total
 
-    def _modes(self, number: int, body: Body, impacts: Sequence[HertzImpact]) -> Array:
-        """Samples (count, CHANNELS) [Pa m] of a body's modes."""
+    def _modes(
+        self, number: int, body: Body, impacts: Sequence[HertzImpact], gains: Gains
+    ) -> Array:
+        """Samples (count,) [Pa m] of a body's modes."""
         assert body.solid is not None
         settings, course = self.settings, self.course
         moved = body.motion(body.shape.vertices)
@@ -98,11 +104,11 @@ class SceneSound:
             rests,
             self.count,
             settings.rate,
-            signed=settings.radiation and body.listening is None,
+            signed=bool(settings.radiation) and body.listening is None,
             damped=settings.contact_damping,
         )
         frequencies, dampings = body.solid.frequencies, body.solid.dampings
-        return ring(frequencies, dampings, self.gains[number], act, self.count, settings.rate)
+        return ring(frequencies, dampings, gains, act, self.count, settings.rate)
 
 
 def sustained_forces(
@@ -118,12 +124,21 @@ def sustained_forces(
     return [each for each in in_parallel(sustained_force, tasks, threads) if each is not None]
 
 
-def gains_of(bodies: Sequence[Body], radiation: bool, threads: int) -> list[Array]:
-    """Gains (K, CHANNELS) [Pa m] of each body's modes, computed once for bodies that share them."""
+def directivities_of(
+    bodies: Sequence[Body], radiation: bool | Literal["boundary-elements"], threads: int
+) -> list[Directivity | None]:
+    """Directivity of each body's modes, None of a silent one; found once for those that share them.
+
+    Raises UserError if boundary elements are asked for and not installed.
+    """
     sounding = {id(body.solid): body for body in bodies if body.solid is not None}
     tasks = [(body, radiation) for body in sounding.values()]
-    gains = dict(zip(sounding, in_parallel(mode_gains, tasks, threads)))
-    silent = np.zeros((0, CHANNELS))
+    # Boundary elements share their work among threads themselves.
+    threads = 1 if radiation == "boundary-elements" else threads
+    found = dict(zip(sounding, in_parallel(mode_directivity, tasks, threads)))
     return [
-        gains.get(id(each.solid), silent) * 10.0 ** (each.entry.level / 20.0) for each in bodies
+        found[id(each.solid)].times(10.0 ** (each.entry.level / 20.0))
+        if each.solid is not None
+        else None
+        for each in bodies
     ]

@@ -22,12 +22,10 @@ import numba
 import numpy as np
 
 from carillon.arrays import Array, Complex
+from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
+from sound.radiation.directivity import Directivity
 from sound.scenes.shape import Shape
 
-AIR_DENSITY = 1.204
-"""Density [kg/m^3] of air at 20 C."""
-SOUND_SPEED = 343.2
-"""Speed of sound [m/s] in air at 20 C."""
 STEPS = 1 << 12
 """Number of steps of a full turn in the table of cosines."""
 SHIFT = float(STEPS * 1024)
@@ -58,6 +56,11 @@ class Radiation:
 
     monopoles: Array
     dipoles: Array
+
+    @property
+    def directivity(self) -> Directivity:
+        """The same, by harmonics up to order 1."""
+        return Directivity.of_dipoles(self.monopoles, self.dipoles)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Sound that the surfaces of vibrating solids radiate into the air."""
