@@ -29,7 +29,7 @@ from sound.radiation.boundary_elements import radiated_by_elements
 from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
 from sound.radiation.directivity import Directivity, even_directions
 from sound.radiation.sphere import radiated
-from sound.scenes.shape import Shape
+from sound.shape import Shape
 from sound.strikes import struck_surface
 
 Array = NDArray[np.float64]

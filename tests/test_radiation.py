@@ -11,7 +11,7 @@ from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
 from sound.radiation.directivity import Directivity, even_directions, harmonics
 from sound.radiation.modes_directivity import modes_directivity
 from sound.radiation.sphere import radiated
-from sound.scenes.shape import Shape
+from sound.shape import Shape
 from sound.strikes import struck_surface
 from sound.synthesis.driven import Excitation, Gains, ring
 from tests.radiation_bem import CHECKED, by_elements, sphere, sphere_pressure

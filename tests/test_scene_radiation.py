@@ -13,7 +13,7 @@ from sound.scenes.audible.loudness import (
     acceleration_filter,
     equivalent_radius,
 )
-from sound.scenes.shape import Shape
+from sound.shape import Shape
 from tests.radiation_bem import approximation, level, sphere_pressure, vibrating_solid
 
 RADIUS = 0.05

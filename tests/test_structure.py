@@ -91,16 +91,18 @@ ARROWS = {
         solver.linear solver.response solver.subspace sound sound.clips sound.project""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.design sound.project sound.synthesis""",
+    "sound.radiation": "sound",
     "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement
         solver.response sound sound.project sound.rendering""",
     "sound.scenes.film": "sound sound.scenes",
     "sound.scenes.contact": "sound.scenes",
     "sound.export": """solver.assembly solver.files solver.response solver.verification
         sound sound.clips sound.project sound.rendering sound.scenes""",
-    "sound.scenes.audible": "sound.rendering sound.scenes sound.scenes.contact sound.synthesis",
+    "sound.scenes.audible": """sound.radiation sound.rendering
+        sound.scenes sound.scenes.contact sound.synthesis""",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export
         sound.project sound.rendering""",
-    "sound.scenes.playing": """sound sound.clips sound.scenes sound.scenes.audible
+    "sound.scenes.playing": """sound sound.clips sound.radiation sound.scenes sound.scenes.audible
         sound.scenes.contact sound.synthesis""",
     #
     "studio": "",

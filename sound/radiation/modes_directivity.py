@@ -20,7 +20,7 @@ from sound.radiation.boundary_elements import radiated_by_elements, same_frequen
 from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
 from sound.radiation.directivity import Directivity
 from sound.radiation.sphere import radiated
-from sound.scenes.shape import Shape
+from sound.shape import Shape
 
 FEWEST_TRIANGLES, MOST_TRIANGLES = 1000, 3000
 """Bounds of the number of triangles of a surface; the time goes as its square."""

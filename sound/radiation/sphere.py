@@ -24,7 +24,7 @@ import numpy as np
 from carillon.arrays import Array, Complex
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.directivity import Directivity
-from sound.scenes.shape import Shape
+from sound.shape import Shape
 
 STEPS = 1 << 12
 """Number of steps of a full turn in the table of cosines."""

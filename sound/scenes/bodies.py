@@ -21,7 +21,7 @@ from sound.scenes.divided import parts_of_one
 from sound.scenes.hertz import compliance
 from sound.scenes.object_entry import ObjectEntry
 from sound.scenes.object_solid import ObjectSolid, Sounding, object_solid
-from sound.scenes.shape import Shape
+from sound.shape import Shape
 
 LIGHTEST = 1e-9
 """Least mass [kg] of a body that the engine of rigid bodies can move."""
