@@ -16,8 +16,9 @@ import soundfile
 from sound.__main__ import main
 from sound.export.engine_folder import STAGING
 from sound.export.full_scale import loudest_peak
+from sound.export.mastering import onset_gains
 from sound.export.modal_model import ModalModel
-from sound.export.sound_set import NEARBY
+from sound.export.sound_set import NEARBY, added_contact
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening
 from sound.rendering.render import Hit, render
@@ -130,10 +131,11 @@ def test_gains_make_files_as_loud_to_each_other_as_the_strikes(folder):
         for number, strength in ((1, 0.25), (2, 1.0)):
             row = rows[f"pan_{strike.name}_s{number}_v1.wav"]
             samples, rate = soundfile.read(folder / "pan/sounds" / row["file"])
-            contact = 2e-4 * strength**-0.2
+            contact = added_contact(0.0, strength)
             assert float(row["contact_seconds"]) == pytest.approx(contact, rel=1e-5)
             hit = Hit(0.0, strike.position, strength * strike.inward)
             truth = render(solid, [hit], 0.2, rate, contact, listening)
+            truth *= onset_gains(truth, rate)
             start = samples[: len(truth)]
             scale = float(start @ truth / (truth @ truth))
             np.testing.assert_allclose(start, scale * truth, atol=2e-6)

@@ -21,7 +21,7 @@ from sound.clips.noise import noise_part
 from sound.clips.wav import PEAK
 from sound.project.design_file import write_design
 from sound.rendering.clip_level import resampled
-from sound.rendering.listening import Listening
+from sound.rendering.listening import BEGIN_SECONDS, Listening
 from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
 from sound.synthesis.sinusoids import Bank, ring
@@ -143,6 +143,9 @@ def test_noise_follows_the_impulse_and_the_rate():
     noise, _ = noise_part(design.targets.residuals[1], design.targets.rates[1])
     begun = round(0.9 * len(noise))  # where it is cut off, it fades
     expected = 3.0 * listening.noise_gains[1] * noise[:begun]
+    rise = round(BEGIN_SECONDS * design.targets.rates[1])
+    assert added[2205] == 0.0  # no file begins with a jump
+    expected[:rise] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(rise) / rise)
     np.testing.assert_allclose(added[2205 : 2205 + begun], expected, atol=1e-12)
     assert np.abs(added[2205 + begun :]).max() < np.abs(added).max()
     assert not added[:2205].any()

@@ -176,15 +176,16 @@ def test_the_point_that_the_clip_sounds_like_is_advised(unit):
     clips = clips_of(design)
     design = replace(design, settings={**design.settings, "unit": unit})
     now = judged(design, clips)
-    assert now.word != LIKE and f"strike {design.strikes[0].name} at [" in now.advice
+    assert now.word != LIKE
+    assert f"] as the point of {design.strikes[0].name} and search again" in now.advice
     at = unit * np.array(
         [float(each) for each in re.findall(r"\[(.*?)\]", now.advice)[0].split(", ")]
     )
     inward = inward_normals(surface_of(design), at[None])[0]
     first = replace(design.strikes[0], position=at, inward=inward)
     there = judged(replace(design, strikes=[first, design.strikes[1]]), clips).likeness[0]
-    assert there.excess < 0.9 * now.likeness[0].excess
-    assert f"there it is {there.distance_db:.1f} dB" in now.advice
+    assert there.excess < 0.8 * now.likeness[0].excess
+    assert f"made as loud, is {there.distance_db:.1f} dB" in now.advice
     assert np.linalg.norm(at - position) < 1e-3 or there.distance_db < LIKE_DECIBELS
 
 

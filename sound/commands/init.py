@@ -35,7 +35,7 @@ class InitOptions:
     mesh: str = option(REQUIRED, "surface mesh file, or builtin:NAME")
     path: str | None = option(
         None,
-        f"folder or file (.yaml) to write (default: {DEFAULT_NAME} in this folder)",
+        f"folder, which is made, or file (.yaml) to write (default: {DEFAULT_NAME} in this folder)",
         metavar="FOLDER|FILE",
     )
     clips: tuple[str, ...] | None = option(
@@ -61,18 +61,18 @@ def run(arguments: argparse.Namespace) -> int:
     """Look at mesh and clips, write the project and say what to do next."""
     from carillon.files.atomic import atomic_path
     from carillon.files.yaml_input import parse_yaml
-    from sound.outputs import require_output
     from sound.project.project import project_of
     from sound.project.template import project_text
 
     options = collect(InitOptions, arguments)
-    path = require_output(_file_of(options.path or "."), ENDINGS)
+    path = _writable(options.path or ".")
     values = _solid(options, path.parent)
     surface = _surface(options.mesh, values)
     values["targets"] = _targets(options, surface, path.parent)
     heard = _heard(options)
     text = project_text(values)
     project_of(parse_yaml(text), path.parent)
+    path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(_sentence(options, path, surface))
@@ -81,11 +81,19 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _file_of(path: str) -> str:
-    file = os.path.join(path, DEFAULT_NAME) if os.path.isdir(path) else path
+def _writable(path: str) -> Path:
+    """The file to write, in a folder that is there or will be, or of its own name."""
+    from carillon.files.paths import require_writable
+    from sound.outputs import require_output
+
+    is_new = not os.path.isdir(path) and not Path(path).suffix
+    file = Path(path, DEFAULT_NAME) if is_new or os.path.isdir(path) else Path(path)
     if os.path.lexists(file):
         raise UserError(f"{file}: is there already; name another file, or remove it first")
-    return file
+    if is_new:
+        require_writable(path)
+        return file
+    return require_output(file, ENDINGS)
 
 
 def _solid(options: InitOptions, folder: Path) -> dict[str, Any]:

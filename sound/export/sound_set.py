@@ -29,6 +29,8 @@ NEARBY = 0.06
 """Greatest distance of a variation's point from its own, over the surface's longest side."""
 TRIALS = 4096
 """Random points among which those near by are looked for."""
+CLIP_CONTACT = 2e-4
+"""Duration [s] that the force of a clip's strike is taken to have; its spectrum is the clip's."""
 HERTZ_EXPONENT = -0.2
 """A contact lasts as the speed, and so the impulse, to this power (Johnson, Contact Mechanics,
 section 11.4)."""
@@ -78,7 +80,7 @@ def rendered_set(
     for row, (label, point) in enumerate(zip(file_names([each.name for each in points]), points)):
         near = _points_near(design, point, options, row)
         for number, strength in enumerate(strengths, start=1):
-            contact = options.contact_seconds * (strength / strengths[-1]) ** HERTZ_EXPONENT
+            contact = added_contact(options.contact_seconds, strength / strengths[-1])
             for variation, (position, inward) in enumerate(near, start=1):
                 hit = Hit(0.0, position, strength * inward)
                 sound = render(solid, [hit], seconds, options.rate, contact, listening)
@@ -97,6 +99,22 @@ def rendered_set(
                     *position.tolist(),
                 )
                 yield SetSound(as_wav(made, options.rate, 24), gain, level)
+
+
+def added_contact(hardest: float, strength: float) -> float:
+    """Duration [s] of a force that makes a clip as dull as a strike of a relative strength is.
+
+    The clip holds the spectrum of its own contact, so the hardest strike, of the strength 1, takes
+    `hardest` [s] alone, as long as the squares of durations add up, which is what the spectra of
+    short forces do.
+
+    Examples
+    --------
+    >>> added_contact(0.0, 1.0), round(added_contact(0.0, 0.25), 6)
+    (0.0, 0.000172)
+    """
+    longer = (hardest**2 + CLIP_CONTACT**2) * strength ** (2.0 * HERTZ_EXPONENT)
+    return float(np.sqrt(max(0.0, longer - CLIP_CONTACT**2)))
 
 
 def _points_near(

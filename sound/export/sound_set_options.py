@@ -31,8 +31,9 @@ class SoundSetOptions:
         3, "for a folder: sounds of each point and strength, the others struck near by"
     )
     contact_seconds: ContactSeconds = option(
-        2e-4,
-        "for a folder: duration of the hardest strike's force, half a sine; softer ones last more",
+        0.0,
+        "for a folder: what the force of the hardest strike, half a sine, lasts longer than that "
+        "of the clips; softer strikes last longer yet",
     )
     rate: SampleRate = option(48_000, "for a folder: samples per second")
     seed: Annotated[int, between(0, 2**32 - 1)] = option(

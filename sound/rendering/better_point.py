@@ -21,7 +21,7 @@ HEARD_POINTS = 8
 """Number of points that are rendered, those whose balance is nearest to the clip's."""
 APART = 0.05
 """Least distance between two of them, over the surface's longest side."""
-WORTHWHILE = 0.9
+WORTHWHILE = 0.8
 """Greatest excess of a point that is better over that of the struck one, see `Likeness.excess`."""
 
 

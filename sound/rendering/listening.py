@@ -12,6 +12,10 @@ from sound.project.design import Design
 from sound.rendering.clip_level import clip_level, resampled
 from sound.rendering.solid import SoundingSolid
 
+BEGIN_SECONDS = 2.5e-4
+"""Time in which a clip's noise begins: with the clip's own modes it begins from rest, but not with
+those of a solid, which have other phases."""
+
 
 @dataclass(frozen=True)
 class Listening:
@@ -67,9 +71,20 @@ class Listening:
         return None if loudness is None else float(self.weights(position) @ loudness.seconds)
 
     def noise(self, rate: int) -> list[Array]:
-        """T residuals (s,) without their tones, after 1 N s, at the sampling rate `rate` [Hz]."""
+        """T residuals (s,) without their tones, after 1 N s, at the sampling rate `rate` [Hz].
+
+        They begin within `BEGIN_SECONDS`.
+        """
         parts = zip(self.noise_gains, self.targets.noises, self.targets.rates)
-        return [gain * resampled(noise, own, rate) for gain, (noise, _), own in parts]
+        return [_begun(gain * resampled(noise, own, rate), rate) for gain, (noise, _), own in parts]
+
+
+def _begun(noise: Array, rate: int) -> Array:
+    """Noise (s,) that begins from 0 by half a cosine."""
+    count = min(len(noise), round(BEGIN_SECONDS * rate))
+    begun = noise.copy()
+    begun[:count] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))
+    return begun
 
 
 def near_weights(points: Array, positions: Array) -> Array:

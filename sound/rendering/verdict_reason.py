@@ -241,7 +241,8 @@ def _elsewhere(judged: Judged, now: Likeness) -> str:
     at = ", ".join(f"{each:.4g}" for each in found[0] / unit)
     there = found[1]
     return (
-        f"strike {now.target} at [{at}] instead: there it is {there.distance_db:.1f} dB from the "
-        f"clip (now {now.distance_db:.1f}) and rings {there.decay_ratio:.1f} times as long (now "
+        f"name [{at}] as the point of {now.target} and search again: even this material, struck "
+        f"there and made as loud, is {there.distance_db:.1f} dB from the clip (now "
+        f"{now.distance_db:.1f}) and rings {there.decay_ratio:.1f} times as long (now "
         f"{now.decay_ratio:.1f})"
     )

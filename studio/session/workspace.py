@@ -97,7 +97,7 @@ class Workspace:
         if not path.is_relative_to(self.folder):
             raise OutsideError(
                 f"{name}: lies outside of the workspace {self.folder.name}, expected a file in it; "
-                "copy it there"
+                "copy it there, and name the copy"
             )
         return path
 
