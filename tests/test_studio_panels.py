@@ -448,12 +448,15 @@ def test_a_verdict_and_partials_without_a_mode_are_told(panels, page):
     panels.tell(bank(verdict=near, left_out_hz=[812.4, 1400.0], ended_by="met"))
     cost = page.locator("#panel-cost")
     expect(cost.locator(".verdict")).to_have_text("Verdict: near the clip, not like it.")
+    beside = page.get_by_text("The design sounds near the clip, not like it; Cost says why.")
+    expect(beside).to_be_visible()
     told = "No mode of this solid can have the clips' partials at 812, 1400 Hz: they are left out."
     expect(cost.get_by_text(told)).to_be_visible()
     expect(cost.get_by_text("The search ended before its time")).to_be_visible()
     panels.tell(bank())
     expect(cost.get_by_text("The search ended before its time")).to_be_hidden()
     expect(cost.locator(".verdict")).to_be_hidden()
+    expect(beside).to_be_hidden()
     expect(cost.get_by_text("they are left out")).to_be_hidden()
 
 

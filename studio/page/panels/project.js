@@ -21,6 +21,7 @@ export function makeProject(element, parts) {
   const { connection, state } = parts;
   /** @type {number | null} */
   let seconds = null;
+  let found = "";
 
   const search = button("Optimise", () => void ask(parts, isSearching(state.current) ? "stop" : "optimise"), {
     class: "main wide",
@@ -140,7 +141,7 @@ export function makeProject(element, parts) {
     search.disabled = phase === "idle" && why !== "";
     const time = seconds === null ? "" : ` for ${withSeconds(seconds)}`;
     const said = {
-      idle: message ?? (why || noteOn(now)),
+      idle: message ?? (why || [found, noteOn(now)].filter(Boolean).join(" ")),
       starting: message ?? "The search is being prepared \u2026",
       running: message ?? `The material is being sought${time}.`,
     };
@@ -160,6 +161,11 @@ export function makeProject(element, parts) {
     setText(fineState, now.fine.message ?? saidOfFine);
     fineState.hidden = fineState.textContent === "";
     forget.disabled = now.solid === null;
+  });
+  connection.onBinary("bank", (header) => {
+    const words = String(header.verdict ?? "").split(":")[0];
+    found = words ? `The design sounds ${words}; Cost says why.` : "";
+    if (state.current) showSearch(state.current);
   });
   connection.onEvent("progress", (event) => {
     const before = seconds === null ? null : Math.round(seconds);
