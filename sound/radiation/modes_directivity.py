@@ -22,7 +22,7 @@ from sound.radiation.directivity import Directivity
 from sound.radiation.sphere import radiated
 from sound.shape import Shape
 
-FEWEST_TRIANGLES, MOST_TRIANGLES = 1000, 3000
+FEWEST_TRIANGLES, MOST_TRIANGLES = 2000, 4000
 """Bounds of the number of triangles of a surface; the time goes as its square."""
 EDGES_PER_WAVE = 6.0
 """Edges of triangles in a wave at the highest frequency, where the bounds let them."""
