@@ -84,6 +84,7 @@ ARROWS = {
         solver.response solver.verification""",
     #
     "sound": "solver.response",
+    "sound.heads": "",
     "sound.synthesis": "solver.response",
     "sound.clips": "sound sound.synthesis",
     "sound.project": "solver.analysis solver.coarsening solver.files sound sound.clips",
@@ -98,11 +99,12 @@ ARROWS = {
     "sound.scenes.contact": "sound.scenes",
     "sound.export": """solver.assembly solver.files solver.response solver.verification
         sound sound.clips sound.project sound.rendering sound.scenes""",
-    "sound.scenes.audible": """sound.radiation sound.rendering
+    "sound.scenes.audible": """sound.heads sound.radiation sound.rendering
         sound.scenes sound.scenes.contact sound.synthesis""",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export
         sound.project sound.rendering""",
-    "sound.scenes.playing": """sound sound.clips sound.radiation sound.scenes sound.scenes.audible
+    "sound.scenes.playing": """sound sound.clips sound.heads sound.radiation sound.scenes
+        sound.scenes.audible
         sound.scenes.contact sound.synthesis""",
     #
     "studio": "",

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from carillon.builtin_names import BUILTIN_PREFIX
 from carillon.parameters import REQUIRED, Check, Within, option, parameters
-from carillon.parameters.quantities import between
+from carillon.parameters.quantities import File, between
 from carillon.parameters.sentences import ParameterError, did_you_mean
 from sound.scenes.object_entry import FILES, Coordinate, Material, ObjectEntry, Vector
 
@@ -41,6 +41,13 @@ class ListenerEntry:
     ) = option(
         None,
         "lines of time [s] and x, y, z [m] that the head moves along, in place of the position",
+    )
+
+    hrtf: File | None = option(
+        None,
+        "measured head in place of a spherical one: SOFA file (AES69, convention "
+        "SimpleFreeFieldHRIR), relative to the scene",
+        metavar="FILE.sofa",
     )
 
     def __post_init__(self) -> None:
@@ -136,6 +143,10 @@ class Scene:
                     ("objects", number, "name"),
                     f"several objects are named {name!r}; give each a name of its own",
                 )
+        if self.listener.hrtf is not None and not self.sound.space:
+            raise ParameterError(
+                ("listener", "hrtf"), "a measured head hears directions; leave out space: false"
+            )
         self._require_support()
 
     def _require_support(self) -> None:
@@ -168,4 +179,5 @@ class Scene:
         named = [getattr(each, key) for each in self.objects for key in FILES]
         files = [name for name in named if name and not name.startswith(BUILTIN_PREFIX)]
         regions = [region for each in self.objects for region in each.regions]
-        return files + [name for region in regions for name in region.files]
+        head = [self.listener.hrtf] if self.listener.hrtf else []
+        return files + [name for region in regions for name in region.files] + head

@@ -35,4 +35,6 @@ def _in_folder(scene: Scene, folder: Path) -> Scene:
         files: Any = {key: in_folder(name, folder) for key, name in named.items() if name}
         regions = tuple(region.in_folder(folder) for region in each.regions)
         objects.append(replace(each, **files, regions=regions))
-    return replace(scene, objects=tuple(objects))
+    head = scene.listener.hrtf
+    listener = replace(scene.listener, hrtf=str(folder / head) if head else None)
+    return replace(scene, objects=tuple(objects), listener=listener)

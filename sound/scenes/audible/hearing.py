@@ -39,12 +39,26 @@ class Head:
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Positions (s, 3) [m] and directions to the right (s, 3) at times (s,) [s]."""
-        places = np.stack([np.interp(times, self.times, each) for each in self.positions.T], axis=1)
+        places = self.places(times)
         ahead = self.facing - places
         right = np.cross(ahead, UP)
         length = np.linalg.norm(right, axis=1, keepdims=True)
         right = np.where(length > 1e-9, right, np.array([1.0, 0.0, 0.0]))
         return places, right / np.linalg.norm(right, axis=1, keepdims=True)
+
+    def places(self, times: Array) -> Array:
+        """Positions (s, 3) [m] at times (s,) [s]."""
+        return np.stack([np.interp(times, self.times, each) for each in self.positions.T], axis=1)
+
+    def axes(self, times: Array) -> Array:
+        """Unit vectors (s, 3, 3) ahead, to the left and up at times (s,) [s]."""
+        places, right = self.at(times)
+        ahead = self.facing - places
+        # Across the right, also where the nose points straight up or at the head itself.
+        ahead = ahead - np.einsum("si,si->s", ahead, right)[:, None] * right
+        length = np.linalg.norm(ahead, axis=1, keepdims=True)
+        ahead = np.where(length > 1e-9, ahead / np.maximum(length, 1e-9), np.cross(UP, right))
+        return np.stack([ahead, -right, np.cross(right, ahead)], axis=1)
 
 
 def towards(motion: Motion, body: int, head: Head) -> Array:
@@ -61,7 +75,7 @@ def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Ar
     """
     times = motion.times
     places, right = head.at(times)
-    away = _seen_away(motion, body, places)
+    away = seen_away(motion, body, places)
     distance = np.maximum(np.linalg.norm(away, axis=1), NEAREST)
     lateral = np.clip(np.einsum("ti,ti->t", away, right) / distance, -1.0, 1.0)
     ears = np.zeros((len(source), 2))
@@ -91,7 +105,7 @@ def along(parts, frames, directions):  # type: ignore[no-untyped-def]
     return total
 
 
-def _seen_away(motion: Motion, body: int, places: Array) -> Array:
+def seen_away(motion: Motion, body: int, places: Array) -> Array:
     """Vectors (t, 3) [m] from a head to where a body emitted the sound that arrives then."""
     track = motion.positions[:, body]
     away = track - places
@@ -141,7 +155,7 @@ def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-u
         for n in range(begin, end):
             since = n - frames[frame]
             place = n - (delays[frame] + since * slower)
-            value = (gains[frame] + since * louder) * _between(source, place)
+            value = (gains[frame] + since * louder) * between_samples(source, place)
             zero = (shadows[frame] + since * brighter) * ratio
             out = scale * ((1.0 + zero) * value + (1.0 - zero) * before_in) - pole * before_out
             before_in, before_out = value, out
@@ -151,7 +165,7 @@ def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)
-def _between(source, place):  # type: ignore[no-untyped-def]
+def between_samples(source, place):  # type: ignore[no-untyped-def]
     """The source between samples, by Lagrange's cubic through four; 0 beyond its ends."""
     whole = int(np.floor(place))
     d = place - whole

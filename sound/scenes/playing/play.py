@@ -10,9 +10,11 @@ from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError
 from carillon.processes.threads import allowed_threads, blas_threads
+from sound.heads.measured_head import MeasuredHead, read_head
 from sound.levels import FULL, HEARD, SoundLevel, decibels, end_dbfs, faded
 from sound.scenes.audible.hearing import Head
 from sound.scenes.audible.loudness import voice
+from sound.scenes.audible.measured_hearing import unmeasured_share
 from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.contact.engine import GroundPlane, simulate
 from sound.scenes.contact.impacts import Touch, split_impacts
@@ -50,6 +52,7 @@ def perform(
     """
     threads = threads or allowed_threads()
     seconds, engine, settings = scene.seconds, scene.engine, scene.sound
+    measured = measured_head_of(scene)
     clock = Clock(visible)
     clock.begin("bodies")
     bodies = bodies_of(scene.objects)
@@ -69,6 +72,9 @@ def perform(
     impacts, contacts = split_impacts(course.contacts, touch, engine, scene.gravity)
     clock.begin("sound")
     camera = camera_of(scene.camera, bodies, course.motion)
+    head = head_of(scene.listener, camera)
+    if measured is not None:
+        _say_unmeasured(measured, course.motion, head)
     player = SceneSound(
         bodies,
         course,
@@ -76,10 +82,11 @@ def perform(
         contacts,
         sustained_forces(contacts, seconds, engine, settings.rate, scene.seed, threads),
         directivities_of(bodies, settings.radiation, threads),
-        head_of(scene.listener, camera),
+        head,
         settings,
         engine,
         round(seconds * settings.rate),
+        measured,
     )
     sound = player.together(threads)
     peak = float(np.abs(sound).max(initial=0.0))
@@ -201,6 +208,25 @@ def head_of(entry: ListenerEntry, camera: Camera) -> Head:
         return Head(path[:, 0], path[:, 1:], facing)
     place = camera.position if entry.position is None else entry.position
     return Head(np.zeros(1), np.array([place]), facing)
+
+
+def measured_head_of(scene: Scene) -> MeasuredHead | None:
+    """The measured head that a scene is heard by; None for a spherical one.
+
+    Raises UserError if its file is unusable.
+    """
+    file = scene.listener.hrtf
+    return None if file is None else read_head(file, float(scene.sound.rate))
+
+
+def _say_unmeasured(measured: MeasuredHead, motion: Motion, head: Head) -> None:
+    """Say which share of directions to bodies the head was not measured in, if any."""
+    share = unmeasured_share(motion, head, measured)
+    if share > 0.0:
+        say(
+            f"the head {measured.title!r} was not measured in {share:.0%} of the directions to the "
+            "objects; the nearest measured ones are heard there"
+        )
 
 
 def _three(values: Array) -> tuple[float, float, float]:

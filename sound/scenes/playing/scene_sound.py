@@ -8,11 +8,13 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.processes.threads import in_parallel
+from sound.heads.measured_head import MeasuredHead
 from sound.radiation.directivity import Directivity
 from sound.scenes.audible.contact_damping import rests_of
 from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, along, heard, towards
 from sound.scenes.audible.loudness import click, clip_noise, mode_directivity
+from sound.scenes.audible.measured_hearing import heard_measured
 from sound.scenes.audible.sustained_contact import SustainedForce, sustained_force
 from sound.scenes.bodies import Body
 from sound.scenes.contact.engine import Course
@@ -28,8 +30,9 @@ AT_ONCE = 16
 class SceneSound:
     """The sound of a scene at the listener's head, body by body, of `count` samples.
 
-    `impacts`, `contacts` by pairs and sustained `forces` are those of the whole scene;
-    `directivities` [Pa m] are those of each body's modes, None of a silent one.
+    A `measured` head is heard by in place of a spherical one, if it is not None.  `impacts`,
+    `contacts` by pairs and sustained `forces` are those of the whole scene; `directivities`
+    [Pa m] are those of each body's modes, None of a silent one.
     """
 
     bodies: Sequence[Body]
@@ -42,6 +45,7 @@ class SceneSound:
     settings: SoundEntry
     engine: EngineEntry
     count: int
+    measured: MeasuredHead | None = None
 
     def together(self, threads: int) -> Array:
         """Sound (count, 2) of all bodies at two ears, added up in the order of the bodies."""
@@ -57,7 +61,10 @@ class SceneSound:
         source = self.source(number)
         if not self.settings.space:
             return np.repeat(source[:, None], 2, axis=1)
-        return heard(source, self.course.motion, number, self.head, self.settings.rate)
+        motion, rate = self.course.motion, self.settings.rate
+        if self.measured is not None:
+            return heard_measured(source, motion, number, self.head, self.measured, rate)
+        return heard(source, motion, number, self.head, rate)
 
     def source(self, number: int) -> Array:
         """Pressure times distance (count,) [Pa m] of a body, in the direction of the head."""

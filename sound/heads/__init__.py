@@ -1,0 +1,1 @@
+"""Measured heads: files of them (SOFA), sound from any direction at their ears, and blends."""
