@@ -171,7 +171,7 @@ def made_heads(count: int = MADE, spacing: float = SPACING, seed: int = 7) -> He
 def listener_of(
     space: HeadSpace, number: int, noise: float, is_left_out: bool, uneven: float = 0.0
 ) -> tuple[Listener, float]:
-    """A listener whose head is that of a number, and the distance [dB] of the nearest other head."""
+    """A listener whose head is that of a number, and how near [dB] the nearest other one is."""
     hidden = space.features[number]
     others = [head for other, head in enumerate(space.heads) if other != number]
     random = np.random.default_rng([number, 1])

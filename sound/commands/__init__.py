@@ -16,6 +16,7 @@ COMMANDS = {
     ),
     "reach": Command("sound.commands.reach", "which modes that a design misses its solid can have"),
     "render": Command("sound.commands.render", "the sound of a strike, as WAV"),
+    "heads": Command("sound.commands.heads", "measured heads of a folder, and blends of them"),
     "export": Command(
         "sound.commands.export", "modes on the mesh, glTF, Faust or moduli, for other tools"
     ),

@@ -131,7 +131,15 @@ class Calibration:
 
 
 def calibration_of(space: HeadSpace, seed: int) -> Calibration:
-    """A calibration that begins, in a space of heads."""
+    """A calibration that begins, in a space of heads.
+
+    Raises UserError if all heads are alike.
+    """
+    if not space.dimensions:
+        raise UserError(
+            f"{', '.join(space.titles)}: nothing to compare, expected at least two heads that "
+            "differ; add others"
+        )
     return Calibration(space.scales, space.titles, seed)
 
 

@@ -26,8 +26,6 @@ BANDS = (500.0, 16_000.0, 20)
 DELAY_WEIGHT = 1.0 / 20e-6
 """Difference of levels [dB] as audible as a difference of delays of 1 s: 1 dB and 20 us are both
 about just noticeable (Mills 1958)."""
-FEWEST = 2
-"""Least number of heads."""
 SUFFIX = ".sofa"
 
 
@@ -79,14 +77,13 @@ class HeadSpace:
     def blend(self, weights: Array, title: str = "blend") -> MeasuredHead:
         """The head of the log magnitudes and delays of all heads, summed with weights (S,)."""
         first = self.heads[0]
-        return replace(
-            first,
-            title=title,
-            log_magnitudes=np.tensordot(
-                weights, np.stack([head.log_magnitudes for head in self.heads]), 1
-            ),
-            delays=np.tensordot(weights, np.stack([head.delays for head in self.heads]), 1),
-        )
+        # One after the other: all together may fill the memory.
+        levels = np.zeros(first.log_magnitudes.shape)
+        for weight, head in zip(weights, self.heads):
+            levels += weight * head.log_magnitudes
+        delays = np.tensordot(weights, np.stack([head.delays for head in self.heads]), 1)
+        log_magnitudes = levels.astype(np.float32)
+        return replace(first, title=title, log_magnitudes=log_magnitudes, delays=delays)
 
     def features_at(self, point: Array) -> Array:
         """Features (D,) [dB] of the blend at a point (K,)."""
@@ -105,7 +102,8 @@ def features_of(head: MeasuredHead) -> Array:
     at = np.round(edges * grid / head.rate).astype(int)
     decibels = head.log_magnitudes * (20.0 / np.log(10.0))
     bands = [
-        decibels[:, :, first : max(last, first + 1)].mean(axis=2) for first, last in zip(at, at[1:])
+        decibels[:, :, first : max(last, first + 1)].mean(axis=2, dtype=float)
+        for first, last in zip(at, at[1:])
     ]
     levels, delays = np.stack(bands), DELAY_WEIGHT * head.delays
     return np.concatenate([levels.ravel() / levels.size**0.5, delays.ravel() / delays.size**0.5])
@@ -123,14 +121,11 @@ def read_heads(
 
     All have the rate [Hz], or that of the first one, and the directions of the first one, in which
     others are interpolated.  `tell` is called with the name of each file.  Raises UserError if
-    there are fewer than two, or one is unusable.
+    there are none, or one is unusable.
     """
     paths = head_files(folder)
-    if len(paths) < FEWEST:
-        raise UserError(
-            f"{folder}: has {len(paths)} measured heads (*{SUFFIX}), expected at least {FEWEST} to "
-            "blend; name another folder"
-        )
+    if not paths:
+        raise UserError(f"{folder}: has no measured heads (*{SUFFIX}); name another folder")
     heads: list[MeasuredHead] = []
     for path in paths:
         if tell is not None:
@@ -154,6 +149,6 @@ def _in_directions(head: MeasuredHead, of: MeasuredHead) -> MeasuredHead:
     if same and np.allclose(head.directions, of.directions, atol=1e-6):
         return replace(head, mesh=of.mesh)
     corners, weights, _ = head.mesh.weights(of.directions)
-    levels = np.einsum("mk,mkef->mef", weights, head.log_magnitudes[corners])
+    levels = np.einsum("mk,mkef->mef", weights.astype(np.float32), head.log_magnitudes[corners])
     delays = np.einsum("mk,mke->me", weights, head.delays[corners])
     return replace(head, mesh=of.mesh, log_magnitudes=levels, delays=delays)

@@ -13,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import resample_poly
 
@@ -58,7 +59,7 @@ class MeasuredHead:
         Sampling rate of its filters.
     mesh : DirectionMesh
         Directions (M, 3) and the triangles between them.
-    log_magnitudes : (M, 2, n / 2 + 1)
+    log_magnitudes : (M, 2, n / 2 + 1), of single precision
         Natural logarithms of the pressure at the left and the right ear over that at the place of
         the head's centre without a head, at multiples of rate / n.
     delays : (M, 2) [s]
@@ -70,7 +71,7 @@ class MeasuredHead:
     title: str
     rate: float
     mesh: DirectionMesh
-    log_magnitudes: Array
+    log_magnitudes: NDArray[np.float32]
     delays: Array
     distance: float
 
@@ -87,7 +88,7 @@ class MeasuredHead:
         filters = np.empty((*self.delays.shape, length))
         for first in range(0, len(filters), AT_ONCE):
             part = slice(first, first + AT_ONCE)
-            filters[part] = minimum_phase(self.log_magnitudes[part])[:, :, :length]
+            filters[part] = minimum_phase(self.log_magnitudes[part].astype(float))[:, :, :length]
         faded = length // FADED_SHARE
         filters[:, :, -faded:] *= np.cos(np.linspace(0.0, np.pi / 2.0, faded)) ** 2
         return filters
@@ -123,13 +124,14 @@ def head_of_responses(measured: MeasuredResponses, rate: float) -> MeasuredHead:
     mesh = DirectionMesh(measured.directions)
     grid = 1 << int(np.ceil(np.log2(GRID_SECONDS * rate)))
     count = len(measured.directions)
-    log_magnitudes = np.empty((count, 2, grid // 2 + 1))
+    log_magnitudes = np.empty((count, 2, grid // 2 + 1), np.float32)
     delays = np.empty((count, 2))
     for first in range(0, count, AT_ONCE):
         part = slice(first, first + AT_ONCE)
         responses = _resampled(measured.responses[part], measured.rate, rate)[:, :, :grid]
-        log_magnitudes[part] = _log_magnitudes(responses, grid, rate)
-        delays[part] = measured.delays[part] + _delays(responses, log_magnitudes[part], rate)
+        logs = _log_magnitudes(responses, grid, rate)
+        log_magnitudes[part] = logs
+        delays[part] = measured.delays[part] + _delays(responses, logs, rate)
     corners, weights, _ = mesh.weights(AHEAD)
     band = slice(*(round(each * grid / rate) for each in REFERENCE))
     log_magnitudes -= (weights[0] @ log_magnitudes[corners[0], :, band].mean(axis=(1, 2))).item()

@@ -18,10 +18,14 @@ from carillon.arrays import Array
 OFFSETS = {1: 1.0, 2: 0.5, 3: 0.0, 4: -0.5, 5: -1.0}
 """By how much the first of a pair costs less than the second one, by the score: 1 if the first is
 definitely better, 5 if the second is."""
-NOISE = 0.3
+NOISE = 0.5
 """Standard deviation of answers, in differences of costs."""
+NEAR = 1.0
+"""Radius about which the cone of the cost is round, in standard deviations of the most audible
+component."""
 BEND, BEND_LENGTH = 0.3, 4.0
-"""Variance of what makes the cost no paraboloid, and the distance [1] over which it changes."""
+"""Variance of what makes the cost no cone, and the distance over which it changes, in standard
+deviations."""
 REACH = 2.5
 """Greatest coordinate, in standard deviations of the heads, of the point that is liked most."""
 
@@ -38,8 +42,9 @@ class Comparison:
 class DifferenceKernel(Kernel):  # type: ignore[misc]
     """Covariance of differences of costs; a row (2 K,) is the two points of one.
 
-    The cost is a slope, a paraboloid, and a smooth rest.  Along components that are less audible,
-    by their `scales` (K,), slope and paraboloid are the smaller.
+    The cost is about the distance from an unknown point, in the order in which components are
+    audible, by their `scales` (K,): a cone r around the mean head, less a slope along z / r, as in
+    |z - y| = |z| - y z / |z| + ..., and a smooth rest for what is otherwise.
     """
 
     def __init__(self, scales: Array) -> None:
@@ -70,10 +75,11 @@ class DifferenceKernel(Kernel):  # type: ignore[misc]
 
     def _of_costs(self, first: Array, second: Array) -> Array:
         audible = self.scales / self.scales.max()
-        slope = (first * audible**2) @ second.T
-        bowl = np.outer((first * audible) ** 2 @ np.ones_like(audible), _squares(second * audible))
+        far, other_far = (np.sqrt(NEAR**2 + _squares(each * audible)) for each in (first, second))
+        slope = (first * audible**2) @ second.T / np.outer(far, other_far)
         apart = _squares(first)[:, None] + _squares(second) - 2.0 * first @ second.T
-        return np.asarray(slope + bowl + BEND * np.exp(-0.5 * apart / BEND_LENGTH**2))
+        rest = BEND * np.exp(-0.5 * apart / BEND_LENGTH**2)
+        return np.asarray(slope + np.outer(far, other_far) + rest)
 
 
 def _squares(points: Array) -> Array:
