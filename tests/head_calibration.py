@@ -22,7 +22,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.command_line.exit_status import run
 from carillon.command_line.progress import say
-from sound.heads.calibration import Calibration, calibration_of
+from sound.heads.calibration import HeadCalibration, calibration_of
 from sound.heads.head_space import HeadSpace, read_heads
 from sound.heads.measured_head import head_of_responses
 from sound.heads.preference import OFFSETS
@@ -78,13 +78,13 @@ class Listener:
 
 
 def by_calibration(listener: Listener, seed: int) -> Array:
-    """The point after all comparisons of a `Calibration`."""
+    """The point after all comparisons of a `HeadCalibration`."""
     calibration = calibration_of(listener.space, seed)
     answer_all(calibration, listener)
     return calibration.best
 
 
-def answer_all(calibration: Calibration, listener: Listener, count: int = COMPARISONS) -> None:
+def answer_all(calibration: HeadCalibration, listener: Listener, count: int = COMPARISONS) -> None:
     """Let a listener answer until so many comparisons are made."""
     while calibration.count < count:
         calibration.answer(listener.compare(*calibration.next_pair()))

@@ -8,10 +8,10 @@ import pytest
 
 from carillon.__main__ import main
 from carillon.errors import UserError
-from sound.heads.calibration import GENERATION, Calibration, calibration_of, load_calibration
+from sound.heads.calibration import GENERATION, HeadCalibration, calibration_of, load_calibration
 from sound.heads.head_space import HeadSpace, distance, features_of, read_heads
 from sound.heads.measured_head import read_head
-from sound.heads.preference import Comparison, Preference
+from sound.heads.preference import Preference, RatedPair
 from tests.head_calibration import absolute_costs, answer_all, at_random, listener_of, made_heads
 from tests.synthetic_heads import Anatomy, sphere_directions, write_head
 
@@ -85,7 +85,7 @@ def test_costs_follow_what_was_said():
         first, second = random.standard_normal((2, 3))
         apart = [np.linalg.norm(SCALES * (each - best)) for each in (first, second)]
         score = int(np.clip(np.round(3.0 + apart[0] - apart[1]), 1, 5))
-        comparisons.append(Comparison(first, second, score))
+        comparisons.append(RatedPair(first, second, score))
     preference = Preference(comparisons, SCALES)
     found = preference.least(np.zeros(3))
     # The mean head is 2.1 away; answers are rounded to a quarter of that.
@@ -104,8 +104,8 @@ def test_least_squares_keeps_what_was_said_of_each_pair():
 # Calibrations
 
 
-def answered(seed: int, scores: list[int]) -> Calibration:
-    calibration = Calibration(SCALES, ["a", "b", "c", "d"], seed)
+def answered(seed: int, scores: list[int]) -> HeadCalibration:
+    calibration = HeadCalibration(SCALES, ["a", "b", "c", "d"], seed)
     for score in scores:
         calibration.answer(score)
     return calibration

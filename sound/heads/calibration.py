@@ -21,7 +21,7 @@ from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import require_file
 from sound.heads.head_space import HeadSpace
-from sound.heads.preference import OFFSETS, Comparison, Preference
+from sound.heads.preference import OFFSETS, Preference, RatedPair
 
 GENERATION = 8
 """Points of a generation, which are compared in pairs."""
@@ -29,13 +29,16 @@ FARTHEST = 3.0
 """Greatest coordinate of a point that is played, in standard deviations of the heads."""
 STEP = 2.0
 """Greatest move of the mean along gradients, in step sizes of the evolution strategy."""
+LEAST_STEP = 0.8
+"""Least step size of the evolution strategy, in standard deviations of the heads: blends that are
+nearer to each other sound so alike that answers tell little."""
 KIND, VERSION = "calibration of a head", 1
 EXPECTED = "a calibration (JSON) that carillon wrote"
 LONGEST_FILE = 1 << 24
 """Most bytes of a file of a calibration."""
 
 
-class Calibration:
+class HeadCalibration:
     """Asks for comparisons of points in a space of heads, and is told the answers.
 
     The same seed and answers give the same pairs, also after the calibration was saved and loaded.
@@ -54,7 +57,7 @@ class Calibration:
         import cma
 
         self.scales, self.titles, self.seed = scales, list(titles), seed
-        self.comparisons: list[Comparison] = []
+        self.comparisons: list[RatedPair] = []
         self.best: Array = np.zeros(len(scales))
         random = np.random.default_rng(seed)
         options = {
@@ -83,7 +86,7 @@ class Calibration:
         """
         if score not in OFFSETS:
             raise UserError(f"a score of {score}, expected 1 to 5")
-        self._take(Comparison(*self.next_pair(), score))
+        self._take(RatedPair(*self.next_pair(), score))
 
     def save(self, path: str | Path) -> None:
         """Write what is needed to go on (JSON); the file is complete or absent."""
@@ -106,7 +109,7 @@ class Calibration:
         with atomic_path(path) as temporary:
             temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
-    def _take(self, comparison: Comparison) -> None:
+    def _take(self, comparison: RatedPair) -> None:
         number = 2 * (self.count % (GENERATION // 2))
         self._generation[number : number + 2] = comparison.first, comparison.second
         self.comparisons.append(comparison)
@@ -124,13 +127,14 @@ class Calibration:
         self._generation = self._drawn()
 
     def _drawn(self) -> Array:
+        self._strategy.sigma = max(self._strategy.sigma, LEAST_STEP)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of points that were moved in between
             points = np.array(self._strategy.ask())
         return np.clip(points, -FARTHEST, FARTHEST)
 
 
-def calibration_of(space: HeadSpace, seed: int) -> Calibration:
+def calibration_of(space: HeadSpace, seed: int) -> HeadCalibration:
     """A calibration that begins, in a space of heads.
 
     Raises UserError if all heads are alike.
@@ -140,10 +144,10 @@ def calibration_of(space: HeadSpace, seed: int) -> Calibration:
             f"{', '.join(space.titles)}: nothing to compare, expected at least two heads that "
             "differ; add others"
         )
-    return Calibration(space.scales, space.titles, seed)
+    return HeadCalibration(space.scales, space.titles, seed)
 
 
-def load_calibration(path: str | Path, space: HeadSpace) -> Calibration:
+def load_calibration(path: str | Path, space: HeadSpace) -> HeadCalibration:
     """The calibration of a file, to go on with.
 
     Raises UserError if there is none, or it is of other heads than those of the space.
@@ -166,17 +170,17 @@ def load_calibration(path: str | Path, space: HeadSpace) -> Calibration:
             f"{path}: is of other heads ({', '.join(titles[:3])} ...), expected those of the "
             "folder; name the folder that it was begun with"
         )
-    calibration = Calibration(space.scales, titles, seed)
+    calibration = HeadCalibration(space.scales, titles, seed)
     for comparison in comparisons:
         calibration._take(comparison)
     return calibration
 
 
-def _comparison(content: dict[str, Any], dimensions: int) -> Comparison:
+def _comparison(content: dict[str, Any], dimensions: int) -> RatedPair:
     first, second = (np.array(content[key], dtype=float) for key in ("first", "second"))
     for point in (first, second):
         if point.shape != (dimensions,) or not (np.abs(point) <= FARTHEST).all():
             raise ValueError(f"a point of shape {point.shape} or beyond {FARTHEST:g}")
     if content["score"] not in OFFSETS:
         raise ValueError(f"a score of {content['score']}")
-    return Comparison(first, second, int(content["score"]))
+    return RatedPair(first, second, int(content["score"]))

@@ -31,7 +31,7 @@ REACH = 2.5
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RatedPair:
     """What a listener said of two points (K,): a score from 1 (first definitely better) to 5."""
 
     first: Array
@@ -89,7 +89,7 @@ def _squares(points: Array) -> Array:
 class Preference:
     """Costs of points (K,) after some comparisons, over that of the mean head (0)."""
 
-    def __init__(self, comparisons: Sequence[Comparison], scales: Array) -> None:
+    def __init__(self, comparisons: Sequence[RatedPair], scales: Array) -> None:
         rows = np.array([np.concatenate([each.first, each.second]) for each in comparisons])
         differences = np.array([-OFFSETS[each.score] for each in comparisons])
         kernel = DifferenceKernel(scales)
