@@ -98,12 +98,22 @@ def test_spherical_positions_delays_and_a_turned_listener_are_understood(sofa):
         elevation = np.degrees(np.arcsin(z / radius))
         file["SourcePosition"][...] = np.stack([azimuth, elevation, radius], axis=1)
         file["SourcePosition"].attrs["Type"] = np.bytes_("spherical")
-        file["ListenerView"][...] = [[0.0, 1.0, 0.0]]
+        # Azimuth, elevation, radius, also of what is up.
+        file["ListenerView"][...] = [[90.0, 0.0, 1.0]]
+        file["ListenerView"].attrs["Type"] = np.bytes_("spherical")
+        file["ListenerUp"][...] = [[0.0, 90.0, 1.0]]
         file["Data.IR"][:, :, :-20] = file["Data.IR"][:, :, 20:]
         file["Data.Delay"][...] = 20.0
     turned = read_head(sofa)
     np.testing.assert_allclose(turned.directions, plain.directions, atol=1e-9)
     np.testing.assert_allclose(turned.delays, plain.delays, atol=2e-6)  # 1/16 sample
+
+
+def test_other_programs_read_what_is_written(sofa):
+    sofar = pytest.importorskip("sofar", reason="sofar is not installed (pip install sofar)")
+    head = sofar.read_sofa(str(sofa), verify=False, verbose=False)
+    head.verify()
+    np.testing.assert_array_equal(head.Data_IR, read_sofa(sofa).responses)
 
 
 def faults() -> dict[str, tuple]:

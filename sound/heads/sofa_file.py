@@ -28,6 +28,8 @@ MOST_NUMBERS = 1 << 27
 """Greatest count of numbers of a dataset, also of one of its chunks."""
 RATES = (8_000.0, 384_000.0)
 """Least and greatest sampling rate [Hz] of a measurement."""
+PURE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
+"""Name by which netCDF knows a dataset that stands for the length of a dimension alone."""
 LONGEST_TEXT = 100
 """Longest text that is read of an attribute, in characters."""
 
@@ -99,7 +101,7 @@ def write_sofa(path: str | Path, head: MeasuredResponses, listener: str, comment
     placed = {
         "ListenerPosition": ("IC", np.zeros((1, 3)), metres),
         "ListenerView": ("IC", np.array([[1.0, 0.0, 0.0]]), metres),
-        "ListenerUp": ("IC", np.array([[0.0, 0.0, 1.0]]), metres),
+        "ListenerUp": ("IC", np.array([[0.0, 0.0, 1.0]]), None),
         "ReceiverPosition": (
             "RCI",
             np.array([[0.0, 0.0875, 0.0], [0.0, -0.0875, 0.0]])[:, :, None],
@@ -117,7 +119,7 @@ def write_sofa(path: str | Path, head: MeasuredResponses, listener: str, comment
         for name, text in attributes.items():
             file.attrs[name] = np.bytes_(text.encode()) if text else h5py.Empty("S1")
         for name, size in sizes.items():
-            file.create_dataset(name, data=np.zeros(size)).make_scale(name)
+            file.create_dataset(name, data=np.zeros(size, ">f4")).make_scale(PURE.format(size))
         for name, (dimensions, values, kind) in placed.items():
             dataset = file.create_dataset(name, data=values, compression="gzip")
             for number, dimension in enumerate(dimensions):
@@ -177,7 +179,7 @@ def _content(path: Path, file: h5py.File) -> MeasuredResponses:
     )
 
 
-def _text(file: h5py.File, name: str) -> str:
+def _text(file: h5py.File | h5py.Dataset, name: str) -> str:
     """An attribute as text, empty if there is none."""
     value = file.attrs.get(name, "")
     if isinstance(value, np.ndarray) and value.size == 1:
@@ -209,19 +211,20 @@ def _numbers(path: Path, file: h5py.File, name: str) -> Array:
     return values
 
 
-def _positions(path: Path, file: h5py.File, name: str, count: int = 1) -> Array:
-    """Positions (count or 1, 3) [m], from spherical (degrees) or cartesian coordinates."""
+def _positions(
+    path: Path, file: h5py.File, name: str, count: int, typed: str | None = None
+) -> Array:
+    """Positions (count or 1, 3) [m], from spherical (degrees) or cartesian coordinates, as the
+    dataset or the one called `typed` says.
+    """
     values = _numbers(path, file, name)
     if values.shape not in ((count, 3), (1, 3)):
         raise UserError(f"{path}: {name} has shape {values.shape}, expected ({count}, 3)")
-    kind = file[name].attrs.get("Type", b"cartesian")
-    kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
+    kind = _text(file[typed or name], "Type") or "cartesian"
     if kind == "cartesian":
         return values
     if kind != "spherical":
-        raise UserError(
-            f"{path}: {name} is of type {kind[:LONGEST_TEXT]!r}, expected spherical or cartesian"
-        )
+        raise UserError(f"{path}: {name} is of type {kind!r}, expected spherical or cartesian")
     azimuth, elevation, radius = np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]
     level = radius * np.cos(elevation)
     return np.stack(
@@ -237,9 +240,8 @@ def _turned(path: Path, file: h5py.File, sources: Array) -> Array:
     if "ListenerView" in file:
         ahead = _positions(path, file, "ListenerView", len(sources))
     if "ListenerUp" in file:
-        up = _numbers(path, file, "ListenerUp")
-    if up.shape not in ((1, 3), (len(sources), 3)):
-        raise UserError(f"{path}: ListenerUp has shape {up.shape}, expected (1, 3)")
+        typed = "ListenerView" if "ListenerView" in file else None
+        up = _positions(path, file, "ListenerUp", len(sources), typed)
     left = np.cross(up, ahead)
     if not np.linalg.norm(left, axis=1).all():
         raise UserError(f"{path}: has a listener that looks straight up, expected ahead")

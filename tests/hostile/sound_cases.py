@@ -91,6 +91,17 @@ hostile(
 )
 hostile("clip into a closed folder", "clip metal --seconds 0.3 --out closed/o.wav", **CLOSED)
 
+# heads --------------------------------------------------------------------------------------------
+
+each(
+    "folder of heads",
+    "heads VALUE",
+    "nowhere '' . ZOO/metal.wav ZOO/odd/{pipe,null,dangling}.wav LONG",
+)
+hostile("a head that is none", "heads heads", "a.sofa", files={"heads/a.sofa": Copy("modes.h5")})
+hostile("a head of text", "heads heads", "a.sofa", files={"heads/a.sofa": "no numbers"})
+hostile("a head that is a pipe", "heads heads", "a.sofa", files={"heads/a.sofa": Place("pipe")})
+
 # init ---------------------------------------------------------------------------------------------
 
 INIT = "init p.yaml --mesh builtin:bar"
