@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
 
 EXAMPLES = """examples:
   carillon heads cipic/
-  carillon heads cipic/ --mix subject_003=2 --mix subject_021=1 --out mixed.sofa
+  carillon heads cipic/ --mix subject_003=2 subject_021=1 --out mixed.sofa
   carillon heads cipic/ --calibration mine.json --out mine.sofa"""
 
 

@@ -18,6 +18,8 @@ from sound.scenes.performance import Motion
 
 HOP = 128
 """Samples from the middle of a block to that of the next one; a block is twice as long."""
+SAMPLED = 200
+"""Number of times, at most, at which it is asked whether directions were measured."""
 AT_ONCE = 256
 """Number of blocks that are filtered at once."""
 
@@ -45,14 +47,15 @@ def heard_measured(
 
 
 def unmeasured_share(motion: Motion, head: Head, measured: MeasuredHead) -> float:
-    """Share of the directions from the head to bodies that it was not measured in, from 0 to 1."""
+    """Share of the directions from the head to bodies that it was not measured in, from 0 to 1, at
+    some times of the motion.
+    """
+    times = motion.times[:: -(-len(motion.times) // SAMPLED)]
     places = head.places(motion.times)
-    unmeasured = [
-        measured.mesh.weights(
-            _directions(motion, motion.positions[:, body] - places, head, motion.times)
-        )[2]
-        for body in range(motion.positions.shape[1])
-    ]
+    unmeasured = []
+    for body in range(motion.positions.shape[1]):
+        directions = _directions(motion, motion.positions[:, body] - places, head, times)
+        unmeasured.append(measured.mesh.weights(directions)[2])
     return float(np.mean(unmeasured))
 
 
