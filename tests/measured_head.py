@@ -15,9 +15,9 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.command_line.exit_status import run
 from sound.heads.measured_head import MeasuredHead, read_head
+from sound.radiation.air import SOUND_SPEED
 from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
 from sound.scenes.audible.measured_hearing import heard_measured
-from sound.scenes.audible.radiation import SOUND_SPEED
 from sound.scenes.performance import Motion
 
 RATE = 44_100

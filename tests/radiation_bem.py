@@ -19,35 +19,26 @@ import trimesh
 from numpy.typing import NDArray
 
 from carillon.errors import UserError
-from carillon.fem.geometry import builtin_surface, hexmesh_from_voxels, voxelize
-from carillon.fem.model import RIGID_MODES, ElasticModel, fine_model
-from carillon.fem.regions import Regions
-from solver.analysis.library import solve
-from solver.response.points import interpolation
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.boundary_elements import radiated_by_elements
 from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
 from sound.radiation.directivity import Directivity, even_directions
 from sound.radiation.sphere import radiated
+from sound.scenes.bodies import Body, bodies_of, with_modes
+from sound.scenes.object_entry import ObjectEntry
 from sound.shape import Shape
-from sound.strikes import struck_surface
 
 Array = NDArray[np.float64]
 
-MATERIALS = {
-    "plate": (60e9, 0.25, 2400.0),
-    "bowl": (100e9, 0.34, 8700.0),
-    "wine-glass": (70e9, 0.22, 2500.0),
-}
-"""Young's modulus [Pa], Poisson's ratio and density [kg/m^3]: stoneware, bronze, glass."""
-STEEL = (200e9, 0.29, 7850.0)
+MATERIALS = {"plate": "ceramic", "bowl": "brass", "wine-glass": "glass"}
+"""Materials by name of the solids that are not of steel."""
+THIN = ("wine-glass",)
+"""Solids of finite cells; all others are of voxels."""
 RESOLUTION = 24
 """Voxels along the longest side."""
-MODES = 26
-"""Modes computed, rigid ones included."""
 COMPARED = 8
 """Elastic modes compared."""
-TRIANGLES = (1000, 2000, 4000)
+TRIANGLES = (2000, 4000)
 """Of a solid's surface, unless told otherwise; the last is the reference."""
 PLAIN_ORDER = 8
 """Highest order of the plainest approximation."""
@@ -77,26 +68,25 @@ class VibratingSurface:
 
 
 @cache
-def solved(name: str) -> tuple[ElasticModel, Array, Array, trimesh.Trimesh]:
-    """A builtin solid, its lowest elastic modes (n_dofs, N) and frequencies (N,), its surface."""
-    mesh = hexmesh_from_voxels(voxelize(builtin_surface(name), RESOLUTION))
-    young, poisson, density = MATERIALS.get(name, STEEL)
-    model = fine_model(mesh, np.full(mesh.n_cells, young), regions=Regions.one(poisson, density))
-    solution = solve(model, modes=MODES)
-    assert solution.modes is not None
-    kept = slice(RIGID_MODES, RIGID_MODES + COMPARED)
-    surface = struck_surface(f"builtin:{name}")
-    return model, solution.modes[:, kept], solution.frequencies[kept], surface
+def solved(name: str) -> Body:
+    """A builtin solid with its lowest elastic modes, about its centre of mass."""
+    entry = ObjectEntry(
+        name=name,
+        mesh=f"builtin:{name}",
+        material=MATERIALS.get(name, "steel"),
+        resolution=RESOLUTION,
+        count=COMPARED,
+        discretisation="finite-cell" if name in THIN else "voxel",
+    )
+    return with_modes(bodies_of([entry]))[0]
 
 
 def vibrating_solid(name: str, triangles: int = TRIANGLES[0]) -> VibratingSurface:
     """A builtin solid in its lowest elastic modes, on a surface of about so many triangles."""
-    model, modes, frequencies, surface = solved(name)
-    mesh = boundary_mesh(surface.vertices, surface.faces, triangles)
-    nodes = modes.reshape(model.mesh.n_nodes, -1)
-    motion = (interpolation(model, mesh.vertices) @ nodes).reshape(len(mesh.vertices), 3, -1)
-    centre = trimesh.Trimesh(surface.vertices, surface.faces).center_mass
-    return VibratingSurface(BoundaryMesh(mesh.vertices - centre, mesh.faces), motion, frequencies)
+    body = solved(name)
+    mesh = boundary_mesh(body.shape.vertices, body.shape.faces, triangles)
+    assert body.solid is not None
+    return VibratingSurface(mesh, body.motion(mesh.vertices), body.solid.frequencies)
 
 
 def level(power: Array) -> Array:

@@ -12,8 +12,8 @@ import numpy as np
 from carillon.arrays import Array
 from sound.heads.minimum_phase import minimum_phase
 from sound.heads.sofa_file import MeasuredResponses, write_sofa
+from sound.radiation.air import SOUND_SPEED
 from sound.scenes.audible.hearing import SHADOW_DEGREES, SHADOW_LEAST
-from sound.scenes.audible.radiation import SOUND_SPEED
 
 RATE, SAMPLES = 44_100, 256
 GRID = 2048

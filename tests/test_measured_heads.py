@@ -12,9 +12,9 @@ from carillon.errors import UserError
 from sound.heads.directions import DirectionMesh
 from sound.heads.measured_head import head_of_responses, read_head
 from sound.heads.sofa_file import read_sofa
+from sound.radiation.air import SOUND_SPEED
 from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
 from sound.scenes.audible.measured_hearing import filtered, heard_measured
-from sound.scenes.audible.radiation import SOUND_SPEED
 from sound.scenes.performance import Motion
 from sound.scenes.playing.play import perform
 from sound.scenes.scene_file import load_scene, scene_of

@@ -99,19 +99,12 @@ ARROWS = {
     "sound.scenes.contact": "sound.scenes",
     "sound.export": """solver.assembly solver.files solver.response solver.verification
         sound sound.clips sound.project sound.rendering sound.scenes""",
-<<<<<<< HEAD
     "sound.scenes.audible": """sound.heads sound.radiation sound.rendering
         sound.scenes sound.scenes.contact sound.synthesis""",
-    "sound.commands": """solver.response sound sound.clips sound.design sound.export
-=======
-    "sound.scenes.audible": """sound.heads sound.rendering sound.scenes sound.scenes.contact
-        sound.synthesis""",
     "sound.commands": """solver.response sound sound.clips sound.design sound.export sound.heads
->>>>>>> a9204b73 (Command heads lists measured heads and writes blends of them)
         sound.project sound.rendering""",
     "sound.scenes.playing": """sound sound.clips sound.heads sound.radiation sound.scenes
-        sound.scenes.audible
-        sound.scenes.contact sound.synthesis""",
+        sound.scenes.audible sound.scenes.contact sound.synthesis""",
     #
     "studio": "",
     "studio.server": "sound.project studio",

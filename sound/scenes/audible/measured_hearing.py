@@ -12,8 +12,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from carillon.arrays import Array
 from sound.heads.measured_head import MeasuredHead
+from sound.radiation.air import SOUND_SPEED
 from sound.scenes.audible.hearing import NEAREST, Head, between_samples, seen_away
-from sound.scenes.audible.radiation import SOUND_SPEED
 from sound.scenes.performance import Motion
 
 HOP = 128
