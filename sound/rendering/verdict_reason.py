@@ -108,7 +108,7 @@ def _left_out(judged: Judged) -> tuple[str, str] | None:
     hertz = ", ".join(f"{each:.0f}" for each in missing)
     return (
         f"no mode of the solid can have the clip's partials at {hertz} Hz",
-        "take a solid with more modes below them: a longer, larger or thinner one",
+        "take a solid with more modes below them: a longer or a thinner one",
     )
 
 
