@@ -872,16 +872,28 @@ class Design:
         """Samples (s,) of strikes, see `carillon.render`."""
         return render(self, at, **how)
 
-    def export(self, path: str | Path, points: int = 0) -> None:
+    @property
+    def build(self) -> dict[str, Any] | None:
+        """What it is built of, and what that costs: errors of the partials [cents] and distance
+        from the clip [dB] before and after; None of a field, see `build` of a project."""
+        return self.found.evidence.get("build")
+
+    def export(self, path: str | Path, points: int = 0, format: str | None = None) -> None:
         """Write it for other tools: .h5, .gltf, .glb, .dsp (Faust), .js (Web Audio), .json or .csv
-        (tables of modes), .npy (moduli), or a folder, ending in `/`, of sounds and models.
+        (tables of modes), .npy (moduli), or a folder, ending in `/`, of sounds and models, or with
+        the format `parts` of the parts of a design that is built of real materials.
 
         Raises UserError if the ending tells no format, or the file cannot be written. `points`:
         struck points of models and sounds, besides the targets'.
         """
-        from sound.export.formats import FOLDER, ExportSettings, export_design, format_of
+        from sound.export.formats import FOLDER, PARTS, ExportSettings, export_design, format_of
 
-        kind, settings = format_of(str(path)), ExportSettings(points=points)
+        kind, settings = format_of(str(path), format), ExportSettings(points=points)
+        if kind == PARTS:
+            from sound.export.parts import write_parts
+
+            write_parts(path, self.found)
+            return
         if kind != FOLDER:
             export_design(path, self.found, kind, settings)
             return
@@ -942,7 +954,13 @@ def design(project: str | Path | None = None, initial: Design | None = None, **k
         described[key] = _plain_entries(value)
     folder = Path() if project is None else Path(project).parent
     problem = prepare(project_of(described, folder))
-    return Design(with_verdict(optimise(problem, None if initial is None else initial.found)))
+    found = optimise(problem, None if initial is None else initial.found)
+    if not problem.project.build.is_asked:
+        return Design(with_verdict(found))
+    from sound.building.cost_of_build import with_cost_of_build
+    from sound.building.restriction import built
+
+    return Design(with_cost_of_build(found, built(problem, found)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ SPEEDS = (1.0, 7000.0)
 EXPECTED = {"steel", "iron", "aluminium", "brass", "tin", "glass", "ceramic", "wood", "plywood"} | {
     "plastic",
     "polycarbonate",
+    "pla",
     "rubber",
     "concrete",
     "stone",

@@ -9,7 +9,7 @@ import pytest
 
 from sound.__main__ import main
 from sound.clips.wav import write_wav
-from sound.commands.design import _sentences, summarise
+from sound.commands.design_summary import sentences, summarise
 from sound.project.design import Design, MaterialDamping
 from sound.synthesis.sinusoids import damped_sinusoids
 from tests.small_design import small_design
@@ -44,29 +44,29 @@ def test_errors_of_frequencies_are_in_cents():
     off = 1200.0 * np.abs(np.log2(design.frequencies / design.targets.frequencies))
     assert summary["frequency_error_median_cents"] == pytest.approx(np.median(off))
     assert summary["frequency_error_max_cents"] == pytest.approx(off.max())
-    said = _sentences(Path("design.h5"), design, summary)
+    said = sentences(Path("design.h5"), design, summary)
     assert f"median error {np.median(off):.1f} cents, worst {off.max():.1f} cents" in said
     assert "left out" not in said and "it rings longer" not in said
 
 
 def test_partials_without_a_mode_and_dampings_far_from_the_clips_are_told():
     design = designed(left_out=np.array([812.4, 1400.0]), left_out_share=0.08)
-    said = _sentences(Path("design.h5"), design, summarise(design))
+    said = sentences(Path("design.h5"), design, summarise(design))
     assert "left out, since no mode can have them: partials at 812, 1400 Hz, 8% of loudness" in said
     damped = replace(design, settings={**design.settings, "damping": {"source": "material"}})
     summary = summarise(damped)
     assert summary["left_out_hz"] == [812.4, 1400.0] and summary["damping_source"] == "material"
-    said = _sentences(Path("design.h5"), damped, summary)
+    said = sentences(Path("design.h5"), damped, summary)
     assert "it rings longer than its clips: take their dampings (damping: {source: clips})" in said
 
 
 def test_moduli_that_no_material_has_are_told():
     design = designed()
-    said = _sentences(Path("design.h5"), design, summarise(design))
+    said = sentences(Path("design.h5"), design, summarise(design))
     assert "warning" not in said
     for factor, words in ((1e6, "stiffer than diamond"), (1e-4, "softer than rubber")):
         made = replace(design, young=factor * design.young)
-        assert words in _sentences(Path("design.h5"), made, summarise(made))
+        assert words in sentences(Path("design.h5"), made, summarise(made))
 
 
 @pytest.mark.parametrize(
@@ -74,9 +74,9 @@ def test_moduli_that_no_material_has_are_told():
 )
 def test_a_search_that_ended_early_says_why(ended_by, says):
     design = designed()
-    assert "ended" not in _sentences(Path("design.h5"), design, summarise(design))
+    assert "ended" not in sentences(Path("design.h5"), design, summarise(design))
     early = replace(design, evidence={**design.evidence, "ended_by": ended_by})
-    assert says in _sentences(Path("design.h5"), early, summarise(early))
+    assert says in sentences(Path("design.h5"), early, summarise(early))
 
 
 def test_a_damping_stands_beside_the_time_of_60_decibels(tmp_path, monkeypatch, capsys):

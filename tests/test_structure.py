@@ -93,6 +93,8 @@ ARROWS = {
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.design sound.project sound.synthesis""",
     "sound.radiation": "sound",
+    "sound.building": """solver.analysis solver.files solver.response sound sound.clips sound.design
+        sound.project sound.rendering""",
     "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement
         solver.response sound sound.project sound.rendering""",
     "sound.scenes.film": "sound sound.scenes",
@@ -101,8 +103,8 @@ ARROWS = {
         sound sound.clips sound.project sound.rendering sound.scenes""",
     "sound.scenes.audible": """sound.heads sound.radiation sound.rendering
         sound.scenes sound.scenes.contact sound.synthesis""",
-    "sound.commands": """solver.response sound sound.clips sound.design sound.export sound.heads
-        sound.project sound.rendering""",
+    "sound.commands": """solver.response sound sound.building sound.clips sound.design sound.export
+        sound.heads sound.project sound.rendering""",
     "sound.scenes.playing": """sound sound.clips sound.heads sound.radiation sound.scenes
         sound.scenes.audible sound.scenes.contact sound.synthesis""",
     #

@@ -7,7 +7,7 @@ would have tiny denominators; they are left out of x_k, and their products u_i^T
 one by one.  `modal_truncation` adds the modes that were not computed.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numba
@@ -56,14 +56,43 @@ def projected_stiffness(
     columns = np.concatenate([vectors, others.reshape(len(vectors), -1)], axis=1)
     for nodes, strains, slopes in parts:
         points = len(strains)
-        flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
-        at_once = max(1, POINTS_AT_ONCE // points)
-        for first in range(0, len(nodes), at_once):
-            cells = nodes[first : first + at_once]
-            energies = np.empty((points * len(cells), total.shape[1]))
-            _pair_energies(cells, flat, columns, pairs, count, energies)
-            total += slopes[points * first : points * (first + len(cells))].T @ energies
+        for first, energies in _energies_by_point(nodes, strains, columns, pairs, count):
+            total += slopes[points * first : points * first + len(energies)].T @ energies
     return total[:, : len(pairs)], total[:, len(pairs) :].reshape(len(total), struck, count)
+
+
+def energies_of_cells(
+    nodes: NDArray[np.integer], strains: Array, vectors: Array, pairs: Index, others: Array
+) -> Array:
+    """Products (c, P + T N) of cells, the sums over p of their matrices B (p, 6, 3 k), `strains`:
+    (B u_i)^T B u_j of pairs of modes, then (B u_i)^T B x_i.
+
+    `nodes` (c, k) are those of the cells, `projected_stiffness` has the other parameters.
+    """
+    count = vectors.shape[1]
+    columns = np.concatenate([vectors, others.reshape(len(vectors), -1)], axis=1)
+    found = np.empty((len(nodes), len(pairs) + columns.shape[1] - count))
+    for first, energies in _energies_by_point(nodes, strains, columns, pairs, count):
+        by_cell = energies.reshape(-1, len(strains), energies.shape[1]).sum(axis=1)
+        found[first : first + len(by_cell)] = by_cell
+    return found
+
+
+def _energies_by_point(
+    nodes: NDArray[np.integer], strains: Array, columns: Array, pairs: Index, count: int
+) -> Iterator[tuple[int, Array]]:
+    """For some cells after others the first one's number, and energies (p c, P + T N) at points.
+
+    The first `count` columns are the modes.
+    """
+    points = len(strains)
+    flat = np.ascontiguousarray(strains.reshape(-1, strains.shape[2]))
+    at_once = max(1, POINTS_AT_ONCE // points)
+    for first in range(0, len(nodes), at_once):
+        cells = nodes[first : first + at_once]
+        energies = np.empty((points * len(cells), len(pairs) + columns.shape[1] - count))
+        _pair_energies(cells, flat, columns, pairs, count, energies)
+        yield first, energies
 
 
 def close_pairs(values: Array) -> Index:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
@@ -20,6 +19,7 @@ from carillon.fem.regions import RegionOf
 from carillon.parameters.quantities import UP_AXES
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
+from sound.project.build_evidence import is_build, is_number
 from sound.strikes import Strike
 
 HISTORY = {
@@ -253,11 +253,11 @@ def fault(design: Design) -> str:
 
 _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "mesh": ("a text", lambda value: isinstance(value, str)),
-    "unit": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
+    "unit": ("a number above 0", lambda value: is_number(value) and value > 0.0),
     "up": (f"null or one of {', '.join(UP_AXES)}", lambda value: value in (None, *UP_AXES)),
     "wall": (
         "null or a number above 0",
-        lambda value: value is None or (_is_number(value) and value > 0.0),
+        lambda value: value is None or (is_number(value) and value > 0.0),
     ),
     "wall_side": (f"one of {', '.join(SIDES)}", lambda value: value in SIDES),
     "material": ("keys and values", lambda value: isinstance(value, Mapping)),
@@ -284,14 +284,12 @@ def _fault_of_texts(design: Design) -> str:
         return f"holds the setting damping.source {source!r:.100}, expected {' or '.join(SOURCES)}"
     for key in ("cost", "cost_start"):
         value = design.evidence.get(key, 0.0)
-        if not _is_number(value):
+        if not is_number(value):
             return f"holds the evidence {key} {value!r:.100}, expected a number"
+    build = design.evidence.get("build")
+    if build is not None and not is_build(build, len(design.model.regions)):
+        return f"holds the evidence build {build!r:.100}, expected what each material is"
     return ""
-
-
-def _is_number(value: Any) -> bool:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)
 
 
 def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:

@@ -31,6 +31,7 @@ from carillon.parameters.sentences import ParameterError
 from solver.analysis.problem import AUTO, ProblemOptions
 from solver.coarsening.choice import LINEAR
 from solver.coarsening.forest import FOREST
+from sound.project.build import BuildSettings
 from sound.project.settings import (
     DampingSettings,
     MaterialSettings,
@@ -92,6 +93,9 @@ class Project:
         MaterialSettings, "the Young's modulus field that is sought"
     )
     damping: DampingSettings = option(DampingSettings, "how the modes of a design are damped")
+    build: BuildSettings = option(
+        BuildSettings, "real materials that the design is built of, once the field is found"
+    )
     weights: Weights = option(Weights, "weights of the parts of the cost")
     optimiser: OptimiserSettings = option(
         OptimiserSettings, "how the material is sought and when the search stops"
@@ -103,6 +107,8 @@ class Project:
         if self.coarsen == AUTO and not self.composition.is_isotropic:
             object.__setattr__(self, "coarsen", "none")
         object.__setattr__(self, "coarsen", self.solid.coarsen)
+        if self.build.is_asked:
+            self._require_buildable()
         bounds = self.material.poisson_bounds
         place = ("material", "poisson_bounds")
         if bounds is not None and not self.regions and not bounds[0] < self.poisson < bounds[1]:
@@ -124,6 +130,21 @@ class Project:
                 raise ParameterError(
                     place, f"found {value:g} beside regions, which tell it; leave one of them out"
                 )
+
+    def _require_buildable(self) -> None:
+        """Refuse a build of materials that there are not, or of what has no voxels of its own."""
+        self.build.choices()
+        if self.discretisation != "voxel":
+            raise ParameterError(
+                ("build",),
+                f"found discretisation: {self.discretisation}, expected voxel; cells that the "
+                "surface cuts are not parts that can be made",
+            )
+        if self.build.per == "region" and len(self.regions) < 2:
+            raise ParameterError(
+                ("build", "per"),
+                "found region and fewer than two regions; name regions, or take per: voxel",
+            )
 
     @property
     def composition(self) -> CompositionEntry:

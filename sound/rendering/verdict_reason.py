@@ -32,6 +32,7 @@ MUCH = 0.2
 """Share of the loudness in partials without a mode, beyond which this is told first."""
 CLIPS_DAMPINGS = "take the dampings of the clips (damping: {source: clips})"
 ANOTHER_SOLID = "take another solid"
+OTHER_MATERIALS = "name other materials below build, or let its cubes be smaller"
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,8 @@ def _off(judged: Judged) -> tuple[str, str] | None:
 
 def _search_on(design: Design) -> str:
     """Advice to search on, where a search ended before it had found what it can."""
+    if design.evidence.get("build"):
+        return OTHER_MATERIALS
     if design.evidence.get("ended_by") not in (BUDGET, INTERRUPT):
         return ""
     checks = [each["cost"] for each in design.evidence.get("checks", [])]
