@@ -11,7 +11,7 @@ from carillon.command_line.counts import counted
 from carillon.parameters import REQUIRED, OneOf, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from sound.commands.common_options import DampingOptions
-from sound.export.formats import FOLDER, FORMATS, ExportSettings, format_of
+from sound.export.formats import FOLDER, FORMATS, PARTS, ExportSettings, format_of
 from sound.export.sound_set_options import SoundSetOptions
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
@@ -30,7 +30,11 @@ class ExportOptions:
         "for carillon modes --material); or a folder, ending in /, of sounds with their levels and "
         "all models, for game engines",
     )
-    format: Annotated[str, OneOf(*FORMATS)] | None = option(None, "where --out has another ending")
+    format: Annotated[str, OneOf(*FORMATS)] | None = option(
+        None,
+        "where --out has another ending; parts fills a folder with the parts of a design that was "
+        "built of real materials: STL, 3MF, a table and a file of regions",
+    )
     json: bool = option(False, "print what was written as JSON")
 
 
@@ -52,6 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     design = read_design(options.design).damped_by(collect(DampingOptions, arguments).damping_from)
     if kind == FOLDER:
         told = _write_folder(options, design, settings, collect(SoundSetOptions, arguments))
+    elif kind == PARTS:
+        told = _write_parts(options, design)
     else:
         told = _write_file(options, design, kind, settings)
     print(json.dumps(told) if options.json else told["sentence"])
@@ -59,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _require_output(options: ExportOptions, kind: str) -> None:
-    if kind == FOLDER:
+    if kind in (FOLDER, PARTS):
         from sound.export.engine_folder import require_folder
 
         require_folder(options.out)
@@ -114,6 +120,27 @@ def _write_folder(
         "removed": written.removed,
         "sounds": [asdict(level) for level in written.levels],
         "sentence": sentence,
+    }
+
+
+def _write_parts(options: ExportOptions, design: Design) -> dict[str, Any]:
+    from sound.export.parts import write_parts
+
+    written = write_parts(options.out, design)
+    listed = ", ".join(f"{row['material']} {row['mass_g']:.4g} g" for row in written.rows)
+    surfaces = (
+        "cut by the solid's surface"
+        if written.is_clipped
+        else "with the faces of voxels, since manifold3d is not installed or the mesh not closed"
+    )
+    return {
+        "out": options.out,
+        "format": PARTS,
+        "files": written.files,
+        "parts": written.rows,
+        "is_clipped": written.is_clipped,
+        "sentence": f"{options.out}: {counted(len(written.rows), 'part')} in millimetres, "
+        f"{surfaces}: {listed}",
     }
 
 

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from carillon.arrays import Array
     from sound.project.design import Design
 
-FOLDER = "folder"
-FORMATS = ("h5", "gltf", "glb", "dsp", "js", "json", "csv", "npy", FOLDER)
+FOLDER, PARTS = "folder", "parts"
+"""What folders hold: sounds and models, or the parts of a design that was built."""
+FORMATS = ("h5", "gltf", "glb", "dsp", "js", "json", "csv", "npy", FOLDER, PARTS)
 MODAL = ("dsp", "js", "json", "csv")
 """Formats of a modal model, see `sound.export.modal_model`."""
 MOST_POINTS = 10_000
@@ -52,7 +53,7 @@ def format_of(out: str, named: str | None = None) -> str:
     if named is None and ending not in FORMATS:
         raise UserError(
             f"--out {out}: the ending tells no format, expected one of "
-            f".{', .'.join(FORMATS[:-1])}, or / for a folder of sounds and models; or name it by "
+            f".{', .'.join(FORMATS[:-2])}, or / for a folder of sounds and models; or name it by "
             "--format"
         )
     return named or ending
@@ -66,7 +67,7 @@ def export_design(
     source: str | None = None,
     name: str | None = None,
 ) -> None:
-    """Write a design, read from the file `source`, in one of `FORMATS` other than a folder's.
+    """Write a design, read from the file `source`, in one of `FORMATS` other than folders'.
 
     The name of models is by default that of the solid.  Raises UserError if the file cannot be
     written.
@@ -109,8 +110,14 @@ def _write_modes(
 def exported_moduli(design: Design) -> Array:
     """Moduli (M,) [Pa] of the voxels as `carillon modes --material` takes them.
 
-    Those of a solid with regions are the factors on the regions' moduli, times 1 GPa.
+    Those of a solid with regions are the factors on the regions' moduli, times 1 GPa. Raises
+    UserError for a design that was built, whose densities differ, too.
     """
+    if design.evidence.get("build"):
+        raise UserError(
+            "the design is built of materials of several densities, which moduli alone do not "
+            "tell; export its parts (--format parts), which regions.yaml describes"
+        )
     if not has_table(design):
         return design.young
     from carillon.fem.materials import UNIFORM_YOUNG
