@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -236,10 +237,7 @@ def test_own_materials_are_named_as_others():
 
 
 def project_of_build(build):
-    described = {**small_project.PROJECT, "build": build}
-    from pathlib import Path
-
-    return project_of(described, Path()).build
+    return project_of({**small_project.PROJECT, "build": build}, Path()).build
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ PATIENCE = 24
 FEW = 8
 """Groups up to which every single change is tried before the search is over."""
 ENOUGH = 1e-3
-"""Share of the cost that a change has to lower in the model to be taken."""
+"""Share of the cost by which as many changes as the limit allows, all alike, lower it at least."""
 
 
 @dataclass(frozen=True)

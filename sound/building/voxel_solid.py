@@ -68,8 +68,9 @@ class VoxelModes:
 class VoxelSolid:
     """The fine solid of a design, whose voxels are of the materials of a `table`.
 
-    The `objective` tells the cost; that of roughness is not part of it. `stiffer` is the factor of
-    what holds the solid, over that for the moduli that the design's search started from.
+    The `objective` tells the cost; that of roughness is not part of it. What holds the solid is as
+    stiff beside the stiffest material as it was beside the one that the design's search began with.
+    `evaluations` counts its modal analyses.
     """
 
     def __init__(self, setting: Setting, table: Regions, objective: Objective) -> None:
