@@ -406,3 +406,16 @@ def test_the_delays_of_a_real_head_are_near_to_woodworths():
     woodworth = HEAD_RADIUS / SOUND_SPEED * (lateral + np.sin(lateral))
     # The mannequin is no sphere: its ears are behind the middle.
     assert np.abs(head.delays[level, 1] - head.delays[level, 0] - woodworth).max() < 60e-6
+
+
+def test_an_equalised_head_has_no_level_of_its_own_but_all_its_directions():
+    head = HEAD
+    colour = np.linspace(0.0, 3.0, head.log_magnitudes.shape[2])
+    coloured = replace(head, log_magnitudes=head.log_magnitudes + colour.astype(np.float32))
+    plain, found = head.equalised(), coloured.equalised()
+    assert found.log_magnitudes == pytest.approx(plain.log_magnitudes, abs=1e-4)
+    between = head.log_magnitudes - head.log_magnitudes[:1]
+    assert found.log_magnitudes - found.log_magnitudes[:1] == pytest.approx(between, abs=1e-4)
+    energies = np.exp(2.0 * plain.log_magnitudes.astype(float)).mean(axis=1)
+    level = head.mesh.shares @ energies
+    assert level == pytest.approx(np.full(len(level), level[0]), rel=1e-4)

@@ -68,6 +68,15 @@ class DirectionMesh:
         unique, counts = np.unique(pairs, axis=0, return_counts=True)
         return unique[counts == 1]
 
+    @cached_property
+    def shares(self) -> Array:
+        """Shares (M,) of the measured directions in the area of all triangles; their sum is 1."""
+        corners = self.directions[self.triangles]
+        doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = np.repeat(np.linalg.norm(doubled, axis=1), 3)
+        total = np.bincount(self.triangles.ravel(), areas, len(self.directions))
+        return np.asarray(total / total.sum())
+
     def weights(self, directions: Array) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
         """Corners (s, 3) and their weights (s, 3), which sum to 1, of unit vectors (s, 3).
 

@@ -7,7 +7,7 @@ either is interpolated by itself, so that responses of different delays do not c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -93,6 +93,20 @@ class MeasuredHead:
         filters[:, :, -faded:] *= np.cos(np.linspace(0.0, np.pi / 2.0, faded)) ** 2
         return filters
 
+    def equalised(self) -> MeasuredHead:
+        """The head without what all directions have in common, as headphones play it.
+
+        That is the level of a diffuse field, the mean energy over all directions and both ears: of
+        the loudspeaker, and of an ear canal, which whoever listens has one of.  The level of
+        `REFERENCE` from straight ahead stays.
+        """
+        logs = self.log_magnitudes.astype(float)
+        energies = np.exp(2.0 * (logs - logs.max())).mean(axis=1)
+        common = 0.5 * np.log(self.mesh.shares @ energies)
+        logs = logs - common
+        logs -= _ahead(self.mesh, _reference(logs, self.rate))
+        return replace(self, log_magnitudes=logs.astype(np.float32))
+
     def responses(self) -> MeasuredResponses:
         """The head as a file has it: filters and delays, of which the least is 0."""
         delays = self.delays - self.delays.min()
@@ -132,12 +146,23 @@ def head_of_responses(measured: MeasuredResponses, rate: float) -> MeasuredHead:
         logs = _log_magnitudes(responses, grid, rate)
         log_magnitudes[part] = logs
         delays[part] = measured.delays[part] + _delays(responses, logs, rate)
-    corners, weights, _ = mesh.weights(AHEAD)
-    band = slice(*(round(each * grid / rate) for each in REFERENCE))
-    log_magnitudes -= (weights[0] @ log_magnitudes[corners[0], :, band].mean(axis=(1, 2))).item()
-    delays -= (weights[0] @ delays[corners[0]].mean(axis=1)).item()
+    log_magnitudes -= _ahead(mesh, _reference(log_magnitudes, rate))
+    delays -= _ahead(mesh, delays)
     distance = float(np.median(measured.distances))
     return MeasuredHead(measured.title, rate, mesh, log_magnitudes, delays, distance)
+
+
+def _reference(log_magnitudes: Array | NDArray[np.float32], rate: float) -> Array:
+    """Mean logarithms (M, 2) of magnitudes (M, 2, n / 2 + 1) at the frequencies of `REFERENCE`."""
+    period = (2 * log_magnitudes.shape[2] - 2) / rate
+    low, high = (round(each * period) for each in REFERENCE)
+    return np.asarray(log_magnitudes[:, :, low:high].mean(axis=2), dtype=float)
+
+
+def _ahead(mesh: DirectionMesh, values: Array) -> float:
+    """Values (M, 2) of both ears straight ahead, their mean."""
+    corners, weights, _ = mesh.weights(AHEAD)
+    return float(weights[0] @ values[corners[0]].mean(axis=1))
 
 
 def _resampled(responses: Array, present: float, rate: float) -> Array:

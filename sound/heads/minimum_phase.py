@@ -12,7 +12,7 @@ def minimum_phase(log_magnitudes: Array) -> Array:
     Examples
     --------
     >>> late = np.array([0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0] + 24 * [0.0])
-    >>> minimum_phase(np.log(np.abs(np.fft.rfft(late))))[:3].round(4).tolist()
+    >>> (minimum_phase(np.log(np.abs(np.fft.rfft(late))))[:3].round(4) + 0.0).tolist()
     [1.0, 0.5, 0.0]
     """
     count = 2 * (log_magnitudes.shape[-1] - 1)

@@ -216,7 +216,7 @@ def measured_head_of(scene: Scene) -> MeasuredHead | None:
     Raises UserError if its file is unusable.
     """
     file = scene.listener.hrtf
-    return None if file is None else read_head(file, float(scene.sound.rate))
+    return None if file is None else read_head(file, float(scene.sound.rate)).equalised()
 
 
 def _say_unmeasured(measured: MeasuredHead, motion: Motion, head: Head) -> None:
