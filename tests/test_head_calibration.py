@@ -167,6 +167,8 @@ def test_files_that_are_no_calibration_are_told(space, folder, tmp_path):
 def test_heads_that_are_alike_leave_nothing_to_compare(space):
     with pytest.raises(UserError, match="nothing to compare"):
         calibration_of(HeadSpace(space.heads[:1]), 0)
+    with pytest.raises(UserError, match="nothing to compare"):
+        calibration_of(HeadSpace([space.heads[2]] * 3), 0)
 
 
 @pytest.mark.parametrize("is_left_out", [True, False])

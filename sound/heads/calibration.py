@@ -88,8 +88,8 @@ class HeadCalibration:
             raise UserError(f"a score of {score}, expected 1 to 5")
         self._take(RatedPair(*self.next_pair(), score))
 
-    def save(self, path: str | Path) -> None:
-        """Write what is needed to go on (JSON); the file is complete or absent."""
+    def as_json(self) -> str:
+        """What is needed to go on, as the text of a file."""
         content = {
             "kind": KIND,
             "version": VERSION,
@@ -106,8 +106,12 @@ class HeadCalibration:
                 for each in self.comparisons
             ],
         }
+        return json.dumps(content, indent=1)
+
+    def save(self, path: str | Path) -> None:
+        """Write what is needed to go on (JSON); the file is complete or absent."""
         with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+            temporary.write_text(self.as_json(), encoding="utf-8")
 
     def _take(self, comparison: RatedPair) -> None:
         number = 2 * (self.count % (GENERATION // 2))

@@ -23,6 +23,8 @@ COMPONENTS = 10
 """Most principal components: 120 comparisons determine about as many numbers."""
 BANDS = (500.0, 16_000.0, 20)
 """Lowest and highest frequency [Hz] that heads are compared in, and the number of bands between."""
+ALIKE = 1e-6
+"""Difference of heads [dB] below which they are one: that of the rounding of equal ones."""
 DELAY_WEIGHT = 1.0 / 20e-6
 """Difference of levels [dB] as audible as a difference of delays of 1 s: 1 dB and 20 us are both
 about just noticeable (Mills 1958)."""
@@ -49,7 +51,8 @@ class HeadSpace:
     def _components(self) -> tuple[Array, Array, Array]:
         mean = self.features.mean(axis=0)
         left, values, _ = np.linalg.svd(self.features - mean, full_matrices=False)
-        count = min(COMPONENTS, int(np.count_nonzero(values > 1e-9 * values[0])))
+        least = max(1e-9 * values[0], ALIKE)
+        count = min(COMPONENTS, int(np.count_nonzero(values > least)))
         # The sign of a component is a matter of the library's; the first head decides it here.
         signs = np.where(left[0, :count] < 0.0, -1.0, 1.0)
         return left[:, :count] * signs, values[:count], mean

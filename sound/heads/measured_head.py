@@ -84,13 +84,10 @@ class MeasuredHead:
     def filters(self) -> Array:
         """Minimum-phase responses (M, 2, L) of the magnitudes."""
         count = self.log_magnitudes.shape[2] * 2 - 2
-        length = count // FILTER_SHARE
-        filters = np.empty((*self.delays.shape, length))
+        filters = np.empty((*self.delays.shape, count // FILTER_SHARE))
         for first in range(0, len(filters), AT_ONCE):
             part = slice(first, first + AT_ONCE)
-            filters[part] = minimum_phase(self.log_magnitudes[part].astype(float))[:, :, :length]
-        faded = length // FADED_SHARE
-        filters[:, :, -faded:] *= np.cos(np.linspace(0.0, np.pi / 2.0, faded)) ** 2
+            filters[part] = filters_of(self.log_magnitudes[part])
         return filters
 
     def equalised(self) -> MeasuredHead:
@@ -114,6 +111,15 @@ class MeasuredHead:
         return MeasuredResponses(
             self.title, self.rate, self.directions, distances, self.filters, delays
         )
+
+
+def filters_of(log_magnitudes: NDArray[np.floating]) -> Array:
+    """Minimum-phase responses (m, 2, L) of natural logarithms of magnitudes (m, 2, n / 2 + 1)."""
+    length = (log_magnitudes.shape[2] * 2 - 2) // FILTER_SHARE
+    filters = minimum_phase(log_magnitudes.astype(float))[:, :, :length]
+    faded = length // FADED_SHARE
+    filters[:, :, -faded:] *= np.cos(np.linspace(0.0, np.pi / 2.0, faded)) ** 2
+    return filters
 
 
 def read_head(path: str | Path, rate: float | None = None) -> MeasuredHead:
