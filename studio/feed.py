@@ -83,6 +83,11 @@ class Pages:
         self._bank: bytes | None = None
         self._feeds: set[Feed] = set()
 
+    @property
+    def bank(self) -> bytes | None:
+        """What the solid sounds like, as it was told last."""
+        return self._bank
+
     def subscribe(self) -> Feed:
         """A feed that begins with all that there is."""
         feed = Feed()

@@ -9,6 +9,10 @@ from studio.feed import Feed
 
 CLIP_PARTS = ("sound", "modes", "rest", "noise")
 """Parts of a clip that can be heard."""
+HEAD_PARTS = ("A", "B", "before", "after")
+"""Sounds of a comparison of heads: its two blends, the first head, the blend preferred so far."""
+STIMULI = ("noise", "strike")
+"""What heads are compared by."""
 EXPORTS = ("h5", "gltf", "glb", "dsp", "npy", "wav", "html", "zip")
 """Kinds of files that a design can be taken home as."""
 
@@ -67,6 +71,9 @@ class Studio(Protocol):
 
     async def clip_spectrum(self, clip: str) -> dict[str, list[float]]:
         """Spectrum of a clip: `hertz`, and `decibels` below the loudest."""
+
+    async def head_sound(self, number: int, part: str, stimulus: str) -> bytes:
+        """A sound of the comparison of a number, in `HEAD_PARTS`, of one of `STIMULI`, as WAV."""
 
     async def export(self, kind: str, target: str | None) -> Download:
         """The design in another form (`EXPORTS`); sounds are those of a strike at a target."""

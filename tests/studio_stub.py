@@ -79,6 +79,12 @@ def solid_entry(surface: int, mesh: trimesh.Trimesh) -> dict[str, Any]:
     }
 
 
+def heads_entry(**changes: Any) -> dict[str, Any]:
+    """No measured heads, as the page is told of them; or others."""
+    none = dict.fromkeys(("folder", "message", "progress", "heads", "comparisons", "direction"))
+    return {"folders": [], **none, "phase": "none", "file": None, "blend": None, **changes}
+
+
 def state_entry(settings: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
     """A state of a studio in which nothing is going on."""
     return {
@@ -95,6 +101,7 @@ def state_entry(settings: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
         "search": {"phase": "idle", "message": None},
         "fine": {"on": False, "phase": "none", "message": None},
         "heard": None,
+        "heads": heads_entry(),
         "builtins": ["bell", "frying-pan"],
         "examples": [{"project": "e1", "name": "recorded-bell", "says": "made up"}],
         "projects": [{"project": "p1", "name": "pan"}],
@@ -306,6 +313,11 @@ class StubStudio:
         level = sum(0.5**k * np.exp(-((hertz / f - 1.0) ** 2) / 1e-4) for k, f in enumerate(WANTED))
         decibels = 20.0 * np.log10(level + 1e-4)
         return {"hertz": hertz.tolist(), "decibels": (decibels - decibels.max()).tolist()}
+
+    async def head_sound(self, number: int, part: str, stimulus: str) -> bytes:
+        if number != 0:
+            raise UserError(f"comparison {number} is not the present one, 0")
+        return wav_of(0.3)
 
     async def export(self, kind: str, target: str | None) -> Download:
         if kind == "wav":

@@ -113,8 +113,9 @@ ARROWS = {
     "studio.standalone": "solver.response sound.design sound.project sound.rendering studio",
     "studio.scene": "sound sound.scenes studio studio.standalone",
     "studio.processes": """solver.analysis solver.files solver.response sound sound.clips
-        sound.design sound.export sound.project sound.rendering studio studio.standalone""",
-    "studio.session": "sound sound.clips sound.project studio studio.processes",
+        sound.design sound.export sound.heads sound.project sound.rendering sound.synthesis
+        studio studio.standalone""",
+    "studio.session": "sound sound.clips sound.heads sound.project studio studio.processes",
     "studio.commands": """sound sound.clips sound.export sound.project
         sound.scenes sound.scenes.film sound.scenes.playing studio.scene studio.server
         studio.session studio.standalone""",

@@ -14,7 +14,14 @@ from starlette.websockets import WebSocket
 from carillon.errors import UserError
 from carillon.parameters.schema import schema_of
 from sound.project.project import Project
-from studio.interface import CLIP_PARTS, EXPORTS, NotFoundError, Studio
+from studio.interface import (
+    CLIP_PARTS,
+    EXPORTS,
+    HEAD_PARTS,
+    STIMULI,
+    NotFoundError,
+    Studio,
+)
 from studio.materials import material_table
 from studio.server.guard import Guard, Keys, fault
 from studio.server.page_files import page_table, send_file, send_page
@@ -59,6 +66,7 @@ def make_app(
             Route("/composition/{number}", routes.composition, methods=["GET"]),
             Route("/clip/{clip}/spectrum", routes.spectrum, methods=["GET"]),
             Route("/clip/{clip}/{part}", routes.sound, methods=["GET"]),
+            Route("/heads/{number}/{part}", routes.heads, methods=["GET"]),
             Route("/export/{kind}", routes.export, methods=["GET"]),
             WebSocketRoute("/socket", routes.socket),
         ],
@@ -123,6 +131,17 @@ class _Routes:
         if part not in CLIP_PARTS:
             raise NotFoundError(f"a clip has no {part!r:.100}; expected {', '.join(CLIP_PARTS)}")
         content = await self._studio.clip_sound(request.path_params["clip"], part)
+        return Response(content, media_type="audio/wav")
+
+    async def heads(self, request: Request) -> Response:
+        part = request.path_params["part"]
+        if part not in HEAD_PARTS:
+            raise NotFoundError(f"heads have no {part!r:.100}; expected {', '.join(HEAD_PARTS)}")
+        stimulus = request.query_params.get("stimulus", STIMULI[0])
+        if stimulus not in STIMULI:
+            raise NotFoundError(f"there is no {stimulus!r:.100}; expected {', '.join(STIMULI)}")
+        number = _number(request, "comparison")
+        content = await self._studio.head_sound(number, part, stimulus)
         return Response(content, media_type="audio/wav")
 
     async def export(self, request: Request) -> Response:

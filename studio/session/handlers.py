@@ -23,6 +23,8 @@ from studio.session.state import StudioState
 
 Text = Annotated[str, Within(max_length=1000)]
 Vertex = Annotated[int, Within(ge=0), "a vertex of the surface"]
+Comparison = Annotated[int, Within(ge=0), "a comparison, counted from 0"]
+Score = Annotated[int, Within(ge=1, le=5), "1 (the first is definitely better) to 5"]
 
 
 class TargetChanges(TypedDict, total=False):
@@ -160,6 +162,26 @@ def swap(state: StudioState) -> None:
     state.do("swap materials", swapped)
 
 
+def look_for_heads(state: StudioState) -> None:
+    """See which folders of the workspace have measured heads."""
+    state.heads.look()
+
+
+async def open_heads(state: StudioState, folder: Text, anew: bool = False) -> None:
+    """Read the heads of a folder of the workspace, and go on with its calibration."""
+    await state.heads.open(folder, anew)
+
+
+async def compare_heads(state: StudioState, number: Comparison, score: Score) -> None:
+    """Say which of the pair of a comparison is nearer to the direction."""
+    await state.heads.answer(number, score)
+
+
+async def write_blend(state: StudioState) -> None:
+    """Write the blend of heads that is preferred at present."""
+    await state.heads.write_blend()
+
+
 HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
     "open_mesh": open_mesh,
     "open_project": open_project,
@@ -183,6 +205,10 @@ HANDLERS: Mapping[str, Callable[..., Awaitable[None] | None]] = {
     "fine": fine,
     "keep": keep,
     "swap": swap,
+    "look_for_heads": look_for_heads,
+    "open_heads": open_heads,
+    "compare_heads": compare_heads,
+    "write_blend": write_blend,
 }
 """What the page may call: functions of a state and of the call's keys, by the call's name."""
 

@@ -44,6 +44,7 @@ def state_event(state: StudioState) -> dict[str, Any]:
         },
         "fine": {"on": state.shows_fine, "phase": state.fine_phase, "message": None},
         "heard": document.heard,
+        "heads": state.heads.state(),
         "builtins": sorted(BUILTINS),
         "examples": [
             {"project": f"e{number}", "name": each.name, "says": each.says}
@@ -87,6 +88,7 @@ def session_of(state: StudioState) -> dict[str, Any]:
         "saved": state.saved == state.document,
         "searching": state.is_searching,
         "fine": state.shows_fine,
+        "heads": state.heads.folder,
         "history": kept(state.history, state.workspace),
     }
 
@@ -100,7 +102,11 @@ def restore(state: StudioState, session: Mapping[str, Any]) -> None:
     name, history = session["name"], restored(session["history"], state.workspace)
     if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME:
         raise ValueError("the name is none")
+    heads = session.get("heads")
+    if not (heads is None or isinstance(heads, str) and 0 < len(heads) <= LONGEST_NAME):
+        raise ValueError("the folder of heads is none")
     saved, fine = bool(session["saved"]), bool(session["fine"])
+    state.heads.folder = heads
     state.is_searching = bool(session["searching"])
     state.name, state.shows_fine = name, fine
     state.history, state.saved = history, history.document if saved else None

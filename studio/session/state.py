@@ -8,6 +8,7 @@ from typing import Any
 from carillon.errors import UserError
 from studio.feed import Pages
 from studio.session.document import Document, History
+from studio.session.heads import Heads
 from studio.session.listening import Clips
 from studio.session.placing import Placing
 from studio.session.restoring import Autosave
@@ -48,7 +49,7 @@ class StudioState:
     history, saved, meshes
         The document, with undo and redo, and as it was saved last; files of uploaded meshes by
         identifier.
-    solid, placing, clips, search, live
+    solid, placing, clips, heads, search, live
         What computes, and the newest material of a search that goes on.
     shows_fine, fine_phase
         Whether the fine solid is to be shown; `none`, `working` or `ready`.
@@ -80,6 +81,7 @@ class StudioState:
         self.solid = SolidClient(workspace.folder, self.changed)
         self.placing = Placing(workspace.folder, self.changed)
         self.clips = Clips(workspace.path, self.changed_and_woken, self.changed)
+        self.heads = Heads(workspace, self.changed)
         self.search = Searching(self._progressed, self._found)
         self._phase = self.search.phase
 

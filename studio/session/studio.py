@@ -8,6 +8,7 @@ from studio.interface import Download, NotFoundError
 from studio.processes.worker import Worker
 from studio.session.document import Document
 from studio.session.handlers import handle
+from studio.session.heads import strike_of
 from studio.session.projects import designed
 from studio.session.reconcile import Reconciler
 from studio.session.snapshot import session_of, state_event
@@ -98,6 +99,12 @@ class DesignStudio:
         stem = name if target is None or kind != "wav" else f"{name}-{target}"
         return Download(f"{stem}.{kind}", MEDIA_TYPES[kind], content)
 
+    async def head_sound(self, number: int, part: str, stimulus: str) -> bytes:
+        """A sound of a comparison of heads."""
+        state = self.session
+        strike = strike_of(state.pages.bank) if stimulus == "strike" else None
+        return await state.heads.sound(number, part, strike)
+
     async def close(self) -> None:
         """Save what is to be saved and end all processes."""
         state = self.session
@@ -107,7 +114,14 @@ class DesignStudio:
         state.autosave.save()
         await self.reconciler.end()
         state.workspace.forget_designs(state.history.designs())
-        for each in (state.solid, state.placing, state.clips, state.search, self._exports):
+        for each in (
+            state.solid,
+            state.placing,
+            state.clips,
+            state.heads,
+            state.search,
+            self._exports,
+        ):
             each.end()
         state.pages.close()
         state.workspace.close()

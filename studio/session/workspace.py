@@ -5,16 +5,18 @@ import os
 import re
 import shutil
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from carillon.command_line.counts import counted
 from carillon.errors import UserError, one_line
 from carillon.files.held_folder import HeldFolder
 from carillon.files.locks import take
 from carillon.files.paths import cause, require_plain
 from carillon.files.yaml_input import MOST_BYTES, parse_yaml, read_yaml
+from sound.heads.head_space import head_files
 from sound.project.template import project_text
 
 OWN_FOLDER = ".studio"
@@ -160,11 +162,56 @@ class Workspace:
         Raises UserError as `require_savable` does, or if a file cannot be read or written.
         """
         self.require_savable(name)
+        self.write_copy(f"{name}.h5", design)
+
+    def write(self, file: str, content: bytes) -> None:
+        """Write a file of the folder; raises UserError if it is a link or cannot be written."""
+        self._files.write(file, content)
+
+    def write_copy(self, file: str, path: Path) -> None:
+        """Write a file of the folder, a copy of another one; errors as those of `write`."""
         try:
-            with open(design, "rb") as source, self._files.writing(f"{name}.h5") as copy:
+            with open(path, "rb") as source, self._files.writing(file) as copy:
                 shutil.copyfileobj(source, copy)
         except OSError as error:
-            raise UserError(f"{design}: cannot be read ({cause(error)})") from None
+            raise UserError(f"{path}: cannot be read ({cause(error)})") from None
+
+    def set_aside(self, file: str) -> None:
+        """Rename a file of the folder, if there is one, to FILE~; errors as those of `write`."""
+        self._files.require_replaceable(file)
+        if self._files.has_file(file):
+            self._copy(file, f"{file}~")
+            self._files.remove(file)
+
+    def head_folders(self) -> dict[str, int]:
+        """Numbers of measured heads in the folders of this one, links aside, that have some."""
+        found: dict[str, int] = {}
+        for path in sorted(self.folder.iterdir()):
+            if path.name.startswith(".") or path.is_symlink() or not path.is_dir():
+                continue
+            with suppress(OSError):  # a folder that may not be read
+                found[path.name] = len(head_files(path))
+        return {name: count for name, count in found.items() if count}
+
+    def heads(self, folder: str, most: int, most_bytes: int) -> Path:
+        """A folder of measured heads by a name that `head_folders` lists.
+
+        Raises OutsideError if a head in it lies outside of the workspace, and UserError if there
+        are fewer than two of them, or more or larger ones than that.
+        """
+        files = [self.path(f"{folder}/{path.name}") for path in head_files(self.folder / folder)]
+        if len(files) < 2:
+            raise UserError(
+                f"{folder}: has {counted(len(files), 'measured head')}, expected at least two to "
+                "blend; copy more SOFA files there, from a database that sofaconventions.org lists"
+            )
+        size = sum(file.stat().st_size for file in files if file.is_file())
+        if len(files) > most or size > most_bytes:
+            raise UserError(
+                f"{folder}: has {len(files):,} measured heads of {size:,} bytes, expected at most "
+                f"{most:,} of {most_bytes:,}; copy fewer into another folder"
+            )
+        return self.path(folder)
 
     def _copy(self, name: str, other: str) -> None:
         with self._files.reading(name) as source, self._files.writing(other) as copy:
