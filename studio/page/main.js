@@ -12,6 +12,7 @@ import { makeClip } from "./panels/clip.js";
 import { makeCompare } from "./panels/compare.js";
 import { makeCost } from "./panels/cost.js";
 import { makeErrors } from "./panels/errors.js";
+import { makeHeads } from "./panels/heads.js";
 import { makeMessages } from "./panels/messages.js";
 import { makeMaterials } from "./panels/materials.js";
 import { makeProject } from "./panels/project.js";
@@ -62,6 +63,7 @@ const PANELS = {
   settings: makeSettings,
   project: makeProject,
   compare: makeCompare,
+  heads: makeHeads,
 };
 
 /** @param {string} selector @returns {HTMLElement} */

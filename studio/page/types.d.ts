@@ -126,6 +126,37 @@ export interface Wanted {
   amplitudes: number[][];
 }
 
+interface AnyHeads {
+  /** Folders of the workspace that have measured heads. */
+  folders: { name: string; heads: number }[];
+  message: string | null;
+  /** Between 0 and 1. */
+  progress: number | null;
+  blend: { file: string; comparisons: number } | null;
+}
+
+export interface ReadHeads extends AnyHeads {
+  phase: "ready";
+  folder: string;
+  /** The calibration of the folder. */
+  file: string;
+  heads: number;
+  comparisons: number;
+  direction: Vector;
+}
+
+/** Measured heads and how far their comparison is. */
+export type HeadsState =
+  | ReadHeads
+  | (AnyHeads & {
+      phase: "none" | "reading" | "failed";
+      folder: string | null;
+      file: string | null;
+      heads: null;
+      comparisons: null;
+      direction: null;
+    });
+
 /** The event `state` of the server. */
 export interface State {
   event: "state";
@@ -148,6 +179,7 @@ export interface State {
   fine: { on: boolean; phase: "none" | "working" | "ready"; message: string | null };
   /** Which of two materials the present one is; `null` while there is no other one to swap with. */
   heard: "A" | "B" | null;
+  heads: HeadsState;
   builtins: string[];
   examples: { project: string; name: string; says: string }[];
   projects: { project: string; name: string }[];
