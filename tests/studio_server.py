@@ -19,7 +19,15 @@ from studio.server.serve import listen, make_server, serve_and_close
 from studio.server.uploads import Limits
 from tests.studio_stub import StubStudio
 
-ROUTES = ("/", "/page/main.js", "/schema.json", "/surface/1", "/clip/c1/sound", "/export/h5")
+ROUTES = (
+    "/",
+    "/page/main.js",
+    "/schema.json",
+    "/surface/1",
+    "/clip/c1/sound",
+    "/heads/0/A",
+    "/export/h5",
+)
 """One of each kind that can be asked for by GET."""
 SECONDS = 20.0
 """Longest wait for an answer."""

@@ -104,6 +104,18 @@ def test_clips_can_be_heard_and_seen(server):
         assert answer.status == 404 and answer.error
 
 
+def test_comparisons_of_heads_can_be_heard(server):
+    for path in ("/heads/0/A", "/heads/0/after?stimulus=strike"):
+        answer = server.ask(path)
+        assert answer.status == 200 and answer.headers["Content-Type"] == "audio/wav"
+        assert answer.content.startswith(b"RIFF")
+    refused = {"/heads/1/A": 400, "/heads/0/C": 404, "/heads/x/A": 404, "/heads/-1/A": 404}
+    refused |= {"/heads/0/A?stimulus=music": 404, f"/heads/{'9' * 40}/A": 404}
+    for path, status in refused.items():
+        answer = server.ask(path)
+        assert answer.status == status and answer.error
+
+
 @pytest.mark.parametrize("kind", EXPORTS)
 def test_designs_are_taken_home_as_files(server, kind):
     answer = server.ask(f"/export/{kind}?target=rim")
