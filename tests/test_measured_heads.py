@@ -152,6 +152,7 @@ def faults() -> dict[str, tuple]:
         ),
         "fewer positions": (put("SourcePosition", DIRECTIONS[:9]), "SourcePosition has shape"),
         "no positions": (lambda file: file.__delitem__("SourcePosition"), "'SourcePosition'"),
+        "a link": (put("Data.IR", h5py.SoftLink("/SourcePosition")), "holds a link, 'Data.IR'"),
         "silence": (put("Data.IR", 0.0 * responses), "response of zeros alone"),
     }
 
@@ -165,6 +166,16 @@ def test_files_that_are_no_use_are_told_in_one_sentence(fault, sofa):
         read_head(sofa)
     assert said in str(error.value) and str(sofa) in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_numbers_are_not_taken_from_another_file(sofa, tmp_path):
+    other = tmp_path / "other.sofa"
+    other.write_bytes(sofa.read_bytes())
+    with h5py.File(sofa, "r+") as file:
+        del file["Data.IR"]
+        file["Data.IR"] = h5py.ExternalLink(str(other), "/Data.IR")
+    with pytest.raises(UserError, match="holds a link, 'Data.IR', expected its numbers here"):
+        read_head(sofa)
 
 
 def test_what_is_no_file_of_a_head_is_told(tmp_path):

@@ -191,6 +191,8 @@ def _text(file: h5py.File | h5py.Dataset, name: str) -> str:
 
 def _numbers(path: Path, file: h5py.File, name: str) -> Array:
     """A dataset of finite numbers, of no more than a head has: they may be compressed."""
+    if isinstance(file.get(name, getlink=True), h5py.ExternalLink | h5py.SoftLink):
+        raise UserError(f"{path}: holds a link, {name!r}, expected its numbers here")
     dataset: Any = file.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu":
         raise UserError(f"{path}: has no numbers {name!r}, expected {EXPECTED}")
