@@ -14,8 +14,8 @@ from studio.processes.heads import StruckModes
 from studio.processes.worker import Worker
 from studio.session.workspace import Workspace
 
-READ_SECONDS = 600.0
-"""Longest time to read the heads of a folder, and the answers of a calibration."""
+READ_SECONDS = 1800.0
+"""Longest time to read the heads of a folder, about 2 s each, and the answers of a calibration."""
 ANSWER_SECONDS = 60.0
 """Longest time to take an answer, to make a sound or to write a blend."""
 MOST_HEADS, MOST_BYTES = 200, 1 << 31

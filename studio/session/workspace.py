@@ -24,6 +24,8 @@ OWN_FOLDER = ".studio"
 PROJECT_ENDINGS = (".yaml", ".yml")
 MOST_PROJECTS = 200
 """Most projects that are listed."""
+MOST_FOLDERS = 200
+"""Most folders of heads that are listed."""
 LONGEST_NAME = 64
 SESSION = "session.json"
 MOST_SESSION_BYTES = 1 << 28
@@ -187,11 +189,14 @@ class Workspace:
         """Numbers of measured heads in the folders of this one, links aside, that have some."""
         found: dict[str, int] = {}
         for path in sorted(self.folder.iterdir()):
+            if len(found) == MOST_FOLDERS:
+                break
             if path.name.startswith(".") or path.is_symlink() or not path.is_dir():
                 continue
             with suppress(OSError):  # a folder that may not be read
-                found[path.name] = len(head_files(path))
-        return {name: count for name, count in found.items() if count}
+                if count := len(head_files(path)):
+                    found[path.name] = count
+        return found
 
     def heads(self, folder: str, most: int, most_bytes: int) -> Path:
         """A folder of measured heads by a name that `head_folders` lists.
