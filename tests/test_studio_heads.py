@@ -15,6 +15,7 @@ from carillon.errors import UserError
 from sound.heads.calibration import calibration_of, load_calibration
 from sound.heads.head_space import distance, read_heads
 from sound.heads.measured_head import read_head
+from sound.heads.stimulus import at_ears, noise_bursts
 from studio.binary import pack
 from studio.interface import NotFoundError
 from studio.processes.heads import SEED
@@ -109,6 +110,12 @@ async def test_both_heads_of_a_pair_are_heard_from_its_direction(folder):
         before = samples(await heads.sound(3, "before", None))
         after = samples(await heads.sound(3, "after", None))
         assert before.shape == after.shape and not np.allclose(before, after)
+        # As scenes hear by the file of the blend, which is that of all heads alike at first.
+        space = read_heads(folder / "people")
+        blend = space.blend(np.full(3, 1.0 / 3.0)).equalised()
+        expected = at_ears(blend, right, noise_bursts(blend.rate, 3))
+        expected *= np.abs(after).max() / np.abs(expected).max()
+        np.testing.assert_allclose(after, expected, atol=1e-6)
         with pytest.raises(UserError, match="comparison 2 is not the present one, 3"):
             await heads.sound(2, "A", None)
 

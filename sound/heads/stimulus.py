@@ -1,4 +1,4 @@
-"""What a listener compares heads by: a sound from a direction at the two ears of a blend."""
+"""What a listener compares heads by: a sound from a direction at the two ears of a head."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from carillon.arrays import Array
-from sound.heads.head_space import HeadSpace
-from sound.heads.measured_head import filters_of
+from sound.heads.measured_head import MeasuredHead, filters_of
 
 DIRECTIONS = (
     (0.0, 0.0),
@@ -50,22 +49,18 @@ def noise_bursts(rate: float, seed: int) -> Array:
     return np.pad(noise, ((0, 0), (0, pause))).ravel()[:-pause]
 
 
-def at_ears(space: HeadSpace, weights: Array, direction: Array, source: Array) -> Array:
-    """Samples (t, 2) at the left and the right ear of the blend of weights (S,) of a source (s,).
+def at_ears(head: MeasuredHead, direction: Array, source: Array) -> Array:
+    """Samples (t, 2) at the left and the right ear of a head of a source (s,).
 
-    The source has the rate of the heads and is far away, in a direction (3,): a unit vector ahead,
+    The source has the rate of the head and is far away, in a direction (3,): a unit vector ahead,
     left, up.  Filters and delays are interpolated between those measured, as scenes do.
     """
-    first = space.heads[0]
-    corners, shares, _ = first.mesh.weights(direction[None])
-    at, shares = corners[0], shares[0]
-    levels = sum(weight * head.log_magnitudes[at] for weight, head in zip(weights, space.heads))
-    delays = sum(weight * head.delays[at] for weight, head in zip(weights, space.heads))
-    filters = np.tensordot(shares, filters_of(np.asarray(levels)), 1)
-    late = LEAD_SECONDS + shares @ np.asarray(delays)
-    length = len(source) + filters.shape[1] + round(2.0 * LEAD_SECONDS * first.rate)
+    corners, weights, _ = head.mesh.weights(direction[None])
+    filters = np.tensordot(weights[0], filters_of(head.log_magnitudes[corners[0]]), 1)
+    late = LEAD_SECONDS + weights[0] @ head.delays[corners[0]]
+    length = len(source) + filters.shape[1] + round(2.0 * LEAD_SECONDS * head.rate)
     count = next_fast_len(length, real=True)
-    frequencies = np.arange(count // 2 + 1) * first.rate / count
+    frequencies = np.arange(count // 2 + 1) * head.rate / count
     heard = rfft(filters, count) * rfft(source, count)
     heard *= np.exp(-2j * np.pi * frequencies * late[:, None])
     return np.asarray(irfft(heard, count)[:, :length].T)

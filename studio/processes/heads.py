@@ -15,6 +15,7 @@ from carillon.errors import UserError
 from sound.clips.wav import as_wav
 from sound.heads.calibration import HeadCalibration, calibration_of, load_calibration
 from sound.heads.head_space import HeadSpace, head_files, read_heads
+from sound.heads.measured_head import MeasuredHead
 from sound.heads.sofa_file import write_sofa
 from sound.heads.stimulus import at_ears, direction_of, noise_bursts
 from sound.synthesis.sinusoids import damped_sinusoids
@@ -54,7 +55,7 @@ class HeadsProcess:
     def __init__(self) -> None:
         self._space = HeadSpace([])
         self._calibration: HeadCalibration | None = None
-        self._first: Array = np.empty(0)
+        self._made: dict[tuple[str, int], dict[str, MeasuredHead]] = {}
 
     def read(
         self, tell: Callable[[tuple[str, float]], None], folder: str, calibration: str | None
@@ -63,7 +64,7 @@ class HeadsProcess:
 
         `tell` receives what is being read, and the share that was.  Returns `news`.
         """
-        self._calibration = None
+        self._calibration, self._made = None, {}
         count, names = len(head_files(folder)), list[str]()
 
         def pass_on(name: str) -> None:
@@ -71,7 +72,6 @@ class HeadsProcess:
             names.append(name)
 
         self._space = read_heads(folder, tell=pass_on)
-        self._first = np.eye(len(self._space.heads))[0]
         if calibration is None:
             self._calibration = calibration_of(self._space, SEED)
         else:
@@ -101,30 +101,40 @@ class HeadsProcess:
         that is preferred at present.
         """
         self._require(number)
-        space, rate = self._space, self._space.heads[0].rate
+        rate = self._space.heads[0].rate
         source = noise_bursts(rate, number) if strike is None else strike.samples(rate)
         direction = direction_of(number)
         heard = {
-            name: at_ears(space, weights, direction, source)
-            for name, weights in self._weights(PAIRS[part]).items()
+            name: at_ears(head, direction, source)
+            for name, head in self._heads(PAIRS[part]).items()
         }
         loudest = max(float(np.abs(each).max()) for each in heard.values())
         return as_wav(heard[part] * (PEAK / loudest if loudest else 1.0), round(rate))
 
     def write(self, out: str) -> int:
         """Write the blend that is preferred to a file (SOFA); the number of comparisons."""
-        blend = self._space.blend(self._weights("blend")["after"])
+        blend = self._space.blend(self._space.weights(self._present.best))
         comparisons = self._present.count
         comment = f"preferred after {counted(comparisons, 'comparison')}"
         write_sofa(out, blend.responses(), "blend", comment)
         return comparisons
 
-    def _weights(self, pair: str) -> dict[str, Array]:
-        """Weights (S,) of the two blends of a pair, by part."""
-        if pair == "blend":
-            return {"before": self._first, "after": self._space.weights(self._present.best)}
-        first, second = self._present.next_pair()
-        return {"A": self._space.weights(first), "B": self._space.weights(second)}
+    def _heads(self, pair: str) -> dict[str, MeasuredHead]:
+        """The two heads of a pair by part, as scenes hear by them; kept for the next sound."""
+        key = pair, self._present.count
+        if key not in self._made:
+            if pair == "blend":
+                points = {"after": self._present.best}
+            else:
+                points = dict(zip("AB", self._present.next_pair()))
+            blends = {name: self._space.blend(self._space.weights(p)) for name, p in points.items()}
+            if pair == "blend":
+                blends["before"] = self._space.heads[0]
+            made = {name: head.equalised() for name, head in blends.items()}
+            # Those of former comparisons are not heard any more.
+            self._made = {each: self._made[each] for each in self._made if each[1] == key[1]}
+            self._made[key] = made
+        return self._made[key]
 
     @property
     def _present(self) -> HeadCalibration:
