@@ -254,7 +254,11 @@ def test_complaints_that_nobody_takes_change_no_status(tmp_path):
     command += (
         'def main(): raise UserError(1)\nraise SystemExit(exit_status.run(1, main))" 2> /dev/full'
     )
-    assert subprocess.run(["bash", "-c", command, sys.executable], cwd=CHECKOUT).returncode == 2
+    words = ["bash", "-c", command, sys.executable]
+    for buffered in ({}, {"PYTHONUNBUFFERED": "1"}):
+        settings = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+        done = subprocess.run(words, cwd=CHECKOUT, env=settings | buffered)
+        assert done.returncode == 2
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, TextIO
 
 from carillon.command_line import logs
 from carillon.command_line.progress import say
@@ -148,16 +148,22 @@ def _nobody_reads() -> bool:
 
 
 def _drop_unwritten() -> None:
-    """Give up what standard output does not take, so that Python does not complain at its end."""
-    try:
-        _flush()
-    except (OSError, ValueError):
-        _drop_output()
+    """Give up what output and errors do not take, so that Python does not complain at its end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except (OSError, ValueError):
+            _drop(stream)
 
 
 def _drop_output() -> None:
+    _drop(sys.stdout)
+
+
+def _drop(stream: TextIO) -> None:
     with suppress(OSError, ValueError):  # no file, as in tests
-        number = sys.stdout.fileno()
+        number = stream.fileno()
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, number)
         os.close(nowhere)

@@ -174,7 +174,7 @@ def open_h5(
     path = require_file(path, f"a Carillon {kind} file (HDF5)")
     try:
         found_seal = _begins_with_seal(path) if checked else _is_sealed(path)
-        file = _opened(path)
+        file = opened_h5(path)
     except OSError as error:
         if error.errno:  # the system's refusal, which says nothing of what the file holds
             raise UserError(
@@ -206,7 +206,7 @@ def require_whole_h5(path: str | Path) -> None:
 
     Raises UserError, see `require_whole`, and OSError if it is no HDF5 file.
     """
-    with _opened(Path(path)) as file:
+    with opened_h5(Path(path)) as file:
         require_whole(file)
 
 
@@ -217,7 +217,7 @@ def kind_of(path: str | Path, what: str) -> tuple[str, int]:
     """
     require_file(path, what)
     try:
-        with _opened(path) as file:
+        with opened_h5(path) as file:
             return str(_claimed(file, "kind")), int(_claimed(file, "schema_version"))
     except Exception:  # HDF5 has many ways to say that bytes make no sense
         return "", -1
@@ -235,8 +235,13 @@ def _claimed(file: h5py.File, name: str, otherwise: Any = None) -> Any:
     return otherwise
 
 
-def _opened(path: str | Path) -> h5py.File:
-    """An HDF5 file opened for reading, without a lock.
+def h5_in_memory(content: io.BytesIO) -> h5py.File:
+    """An HDF5 file that is written to memory, for formats of others."""
+    return h5py.File(content, "w")
+
+
+def opened_h5(path: str | Path) -> h5py.File:
+    """An HDF5 file of any kind opened for reading, without a lock.
 
     Files are complete or absent, so nobody writes to one that is read; and some file systems have
     no locks.

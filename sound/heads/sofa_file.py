@@ -16,6 +16,7 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
+from carillon.files.hdf5 import h5_in_memory, opened_h5
 from carillon.files.paths import first_line, require_file
 
 CONVENTION = "SimpleFreeFieldHRIR"
@@ -70,7 +71,7 @@ def read_sofa(path: str | Path) -> MeasuredResponses:
     """
     path = require_file(path, EXPECTED)
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with opened_h5(path) as file:
             return _content(path, file)
     except UserError:
         raise
@@ -115,7 +116,7 @@ def write_sofa(path: str | Path, head: MeasuredResponses, listener: str, comment
     }
     sizes = {"M": count, "R": ears, "N": samples, "E": 1, "I": 1, "C": 3}
     content = io.BytesIO()
-    with h5py.File(content, "w") as file:
+    with h5_in_memory(content) as file:
         for name, text in attributes.items():
             file.attrs[name] = np.bytes_(text.encode()) if text else h5py.Empty("S1")
         for name, size in sizes.items():
