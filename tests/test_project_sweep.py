@@ -16,7 +16,11 @@ from sound.project.project import Project, load_project, project_of
 from studio.session import open_studio
 
 LEAST = {"mesh": "builtin:bar", "targets": [{"name": "end", "vertex": 3, "clip": "end.wav"}]}
-ENTRIES = {"regions": [{"name": "body"}], "supports": [{"where": "x < 0"}]}
+ENTRIES = {
+    "regions": [{"name": "body"}],
+    "supports": [{"where": "x < 0"}],
+    "build": {"own_materials": [{"name": "own"}]},
+}
 """Entries of the lists that are empty unless given, whose values are put in place."""
 VALUES: tuple[Any, ...] = (
     None,
