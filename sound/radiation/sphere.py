@@ -95,10 +95,9 @@ def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation
     (E. G. Williams, Fourier Acoustics, 1999, chapter 6).
 
     Averaged over directions, the level of the first eight elastic modes is 0.9 dB (rms) off that by
-    the boundary element method for a steel bar, 0.8 dB for a stoneware plate and 5.3 dB for a
-    bronze bowl, which amplifies some modes by resonance of the air in it: the worst is 11 dB too
-    soft.  The velocity as a function of x/|x| on the sphere would be 3.9, 7.2 and 13.7 dB off
-    (`python -m tests.radiation_bem bar plate bowl`).
+    the boundary element method for a steel bar, 0.8 dB for a stoneware plate, 5.6 dB for a brass
+    bowl and 6.6 dB for a wine glass, which amplify some modes by resonance of the air in them: the
+    worst is 12 dB too soft (`python -m tests.radiation_bem bar plate bowl wine-glass`).
     """
     panels = _panels(solid_motion, shape)
     numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
