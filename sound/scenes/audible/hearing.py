@@ -82,7 +82,8 @@ def heard(source: Array, motion: Motion, body: int, head: Head, rate: int) -> Ar
     for ear, side in enumerate((-1.0, 1.0)):
         angle = np.arccos(np.clip(side * lateral, -1.0, 1.0))
         delays = rate * (distance + _around(angle)) / SOUND_SPEED
-        ears[:, ear] = _through(source, rate * times, delays, 1.0 / distance, _shadow(angle), rate)
+        arriving = delayed(source, rate * times, delays, 1.0 / distance)
+        ears[:, ear] = _shadowed(arriving, rate * times, _shadow(angle), rate)
     return ears
 
 
@@ -133,15 +134,10 @@ def _shadow(angle: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-untyped-def]
-    """A source with delays, gains and head shadows that are linear from frame to frame."""
+def delayed(source, frames, delays, gains):  # type: ignore[no-untyped-def]
+    """A source (s,) with delays [samples] and gains that are linear from frame to frame (t,)."""
     count = len(source)
     heard = np.zeros(count)
-    # (1 + shadow s / (2 w)) / (1 + s / (2 w)), w = c / a, by the bilinear transformation.
-    corner = 2.0 * SOUND_SPEED / HEAD_RADIUS
-    ratio = 2.0 * rate / corner
-    pole, scale = (1.0 - ratio) / (1.0 + ratio), 1.0 / (1.0 + ratio)
-    before_in, before_out = 0.0, 0.0
     last = len(frames) - 1
     begin = 0
     for frame in range(len(frames)):
@@ -151,12 +147,33 @@ def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-u
         then = min(frame + 1, last)
         slower = (delays[then] - delays[frame]) / length
         louder = (gains[then] - gains[frame]) / length
-        brighter = (shadows[then] - shadows[frame]) / length
         for n in range(begin, end):
             since = n - frames[frame]
             place = n - (delays[frame] + since * slower)
-            value = (gains[frame] + since * louder) * between_samples(source, place)
-            zero = (shadows[frame] + since * brighter) * ratio
+            heard[n] = (gains[frame] + since * louder) * _between(source, place)
+        begin = max(begin, end)
+    return heard
+
+
+@numba.njit(cache=True, nogil=True)
+def _shadowed(arriving, frames, shadows, rate):  # type: ignore[no-untyped-def]
+    """A sound (s,) through head shadows that are linear from frame to frame (t,)."""
+    count = len(arriving)
+    heard = np.zeros(count)
+    # (1 + shadow s / (2 w)) / (1 + s / (2 w)), w = c / a, by the bilinear transformation.
+    corner = 2.0 * SOUND_SPEED / HEAD_RADIUS
+    ratio = 2.0 * rate / corner
+    pole, scale = (1.0 - ratio) / (1.0 + ratio), 1.0 / (1.0 + ratio)
+    before_in, before_out = 0.0, 0.0
+    last = len(frames) - 1
+    begin = 0
+    for frame in range(len(frames)):
+        end = min(count, int(np.ceil(frames[frame + 1]))) if frame < last else count
+        length = frames[frame + 1] - frames[frame] if frame < last else 1.0
+        brighter = (shadows[min(frame + 1, last)] - shadows[frame]) / length
+        for n in range(begin, end):
+            value = arriving[n]
+            zero = (shadows[frame] + (n - frames[frame]) * brighter) * ratio
             out = scale * ((1.0 + zero) * value + (1.0 - zero) * before_in) - pole * before_out
             before_in, before_out = value, out
             heard[n] = out
@@ -165,7 +182,7 @@ def _through(source, frames, delays, gains, shadows, rate):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)
-def between_samples(source, place):  # type: ignore[no-untyped-def]
+def _between(source, place):  # type: ignore[no-untyped-def]
     """The source between samples, by Lagrange's cubic through four; 0 beyond its ends."""
     whole = int(np.floor(place))
     d = place - whole

@@ -5,7 +5,6 @@ by direction is a filter and a delay of the measurement.  Filters change from bl
 block of the arriving sound fades in and out, and goes through the filter of its middle.
 """
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
@@ -13,7 +12,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from carillon.arrays import Array
 from sound.heads.measured_head import MeasuredHead
 from sound.radiation.air import SOUND_SPEED
-from sound.scenes.audible.hearing import NEAREST, Head, between_samples, seen_away
+from sound.scenes.audible.hearing import NEAREST, Head, delayed, seen_away
 from sound.scenes.performance import Motion
 
 HOP = 128
@@ -41,7 +40,7 @@ def heard_measured(
     ears = np.zeros((len(source), 2))
     for ear in range(2):
         way = distance / SOUND_SPEED + np.interp(times, middles, onsets[ear])
-        arriving = _delayed(source, rate * times, rate * way, 1.0 / distance)
+        arriving = delayed(source, rate * times, rate * way, 1.0 / distance)
         ears[:, ear] = filtered(arriving, measured.filters[:, ear], corners, weights)
     return ears
 
@@ -91,25 +90,3 @@ def _directions(motion: Motion, away: Array, head: Head, times: Array) -> Array:
     # A body in the middle of the head is heard from ahead.
     turned = np.where(length > 1e-9, turned, np.array([1.0, 0.0, 0.0]))
     return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
-
-
-@numba.njit(cache=True, nogil=True)
-def _delayed(source, frames, delays, gains):  # type: ignore[no-untyped-def]
-    """A source (s,) with delays [samples] and gains that are linear from frame to frame (t,)."""
-    count = len(source)
-    heard = np.zeros(count)
-    last = len(frames) - 1
-    begin = 0
-    for frame in range(len(frames)):
-        # After the last frame its values hold.
-        end = min(count, int(np.ceil(frames[frame + 1]))) if frame < last else count
-        length = frames[frame + 1] - frames[frame] if frame < last else 1.0
-        then = min(frame + 1, last)
-        slower = (delays[then] - delays[frame]) / length
-        louder = (gains[then] - gains[frame]) / length
-        for n in range(begin, end):
-            since = n - frames[frame]
-            place = n - (delays[frame] + since * slower)
-            heard[n] = (gains[frame] + since * louder) * between_samples(source, place)
-        begin = max(begin, end)
-    return heard
