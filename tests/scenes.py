@@ -3,13 +3,16 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from carillon.arrays import Array, Index
 from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.contact.engine import Course, GroundPlane, simulate
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact, Touch, split_impacts
 from sound.scenes.scene import Scene
 from sound.scenes.scene_file import scene_of
+from sound.synthesis.driven import BLOCK, Excitation
 
 QUIET = {"radiation": False, "space": False, "contact_damping": False, "noise": False}
 """Sound of modes alone, as they are struck."""
@@ -44,3 +47,11 @@ def struck(described: Scene) -> tuple[list[Body], list[HertzImpact], list[Sustai
     bodies, course = moved(described)
     touch = Touch(bodies, described.ground_material)
     return bodies, *split_impacts(course.contacts, touch, described.engine, described.gravity)
+
+
+def strikes_alone(firsts: Index, since: Array, durations: Array, amplitudes: Array) -> Excitation:
+    """Strikes of modes that no lasting force drives and nothing touches."""
+    none, rows = np.zeros(0, np.int64), np.zeros((0, amplitudes.shape[1]))
+    return Excitation(
+        firsts, since, durations, amplitudes, none, np.zeros((0, BLOCK)), rows, none, rows
+    )

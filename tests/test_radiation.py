@@ -13,9 +13,10 @@ from sound.radiation.modes_directivity import modes_directivity
 from sound.radiation.sphere import radiated
 from sound.shape import Shape
 from sound.strikes import struck_surface
-from sound.synthesis.driven import Excitation, Gains, ring
+from sound.synthesis.driven import Gains, ring
 from tests.radiation_bem import CHECKED, by_elements, sphere, sphere_pressure
 from tests.radiation_bem import RADIUS as BALL_RADIUS
+from tests.scenes import strikes_alone
 
 RATE = 44_100
 
@@ -96,17 +97,7 @@ def test_modes_of_about_one_frequency_share_a_system():
 
 def test_a_gain_of_a_quarter_period_shifts_a_mode_by_it():
     hertz, damping, count = 441.0, 4.0, 4410
-    act = Excitation(
-        np.zeros(1, np.int64),
-        np.zeros(1),
-        np.zeros(1),
-        np.ones((1, 1)),
-        np.zeros(0, np.int64),
-        np.zeros((0, 64)),
-        np.zeros((0, 1)),
-        np.zeros(0, np.int64),
-        np.zeros((0, 1)),
-    )
+    act = strikes_alone(np.zeros(1, np.int64), np.zeros(1), np.zeros(1), np.ones((1, 1)))
     found = [
         ring(
             np.array([hertz]), np.array([damping]), Gains.constant(np.array([g])), act, count, RATE
@@ -122,17 +113,7 @@ def test_a_gain_of_a_quarter_period_shifts_a_mode_by_it():
 
 def test_gains_between_frames_are_linear_and_hold_after_the_last():
     count = 600
-    act = Excitation(
-        np.zeros(1, np.int64),
-        np.zeros(1),
-        np.zeros(1),
-        np.ones((1, 2)),
-        np.zeros(0, np.int64),
-        np.zeros((0, 64)),
-        np.zeros((0, 2)),
-        np.zeros(0, np.int64),
-        np.zeros((0, 2)),
-    )
+    act = strikes_alone(np.zeros(1, np.int64), np.zeros(1), np.zeros(1), np.ones((1, 2)))
     hertz, dampings = np.array([300.0, 700.0]), np.array([2.0, 3.0])
     frames = np.array([0.0, 100.5, 333.0])
     values = np.array([[1.0, 0.0], [0.5 + 1.0j, 2.0], [-1.0, 1.0j]])

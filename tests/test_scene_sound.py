@@ -20,11 +20,11 @@ from sound.scenes.bodies import bodies_of
 from sound.scenes.hertz import stiffness
 from sound.scenes.performance import Motion
 from sound.scenes.playing.play import perform
-from sound.synthesis.driven import BLOCK, Excitation, Gains, ring
+from sound.synthesis.driven import BLOCK, Gains, ring
 from sound.synthesis.sinusoids import Bank
 from sound.synthesis.sinusoids import ring as ring_bank
 from studio.scene.page import write_scene_page
-from tests.scenes import QUIET, ball, require_engine, scene, struck
+from tests.scenes import QUIET, ball, require_engine, scene, strikes_alone, struck
 from tests.small_design import small_design
 
 RATE = 44_100
@@ -76,7 +76,7 @@ def test_modes_ring_as_the_bank_has_them_from_strike_to_strike():
     seconds = np.array([0.01, 0.0123456, 0.2])
     amplitudes = np.array([[1.0, 0.5, 1.0], [0.3, 2.0, 0.0], [1.0, 1.0, 1.0]])
     firsts = np.ceil(seconds * RATE).astype(np.int64)
-    act = _struck(firsts, firsts - seconds * RATE, np.zeros(3), amplitudes)
+    act = strikes_alone(firsts, firsts - seconds * RATE, np.zeros(3), amplitudes)
     found = ring(hertz, dampings, Gains.constant(np.ones(3)), act, RATE // 2, RATE)
     expected = ring_bank(Bank(hertz, dampings, RATE), list(zip(seconds, amplitudes)), RATE // 2)
     assert decibels(found, expected) < -200.0
@@ -84,7 +84,7 @@ def test_modes_ring_as_the_bank_has_them_from_strike_to_strike():
 
 def test_what_a_body_lies_on_damps_it_by_as_much_as_is_told():
     count, added = RATE // 4, 40.0
-    act = _struck(np.zeros(1, np.int64), np.zeros(1), np.zeros(1), np.ones((1, 1)))
+    act = strikes_alone(np.zeros(1, np.int64), np.zeros(1), np.zeros(1), np.ones((1, 1)))
     blocks = np.arange(-(-count // BLOCK))
     damped = replace(act, damped=blocks, dampings=np.full((len(blocks), 1), added))
     found = ring(
@@ -102,7 +102,7 @@ def test_a_force_that_lasts_moves_a_mode_as_its_equation_of_motion_says():
     seconds = np.arange(count) / RATE
     force = np.sin(2 * np.pi * drive * seconds)
     act = replace(
-        _struck(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 1))),
+        strikes_alone(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 1))),
         blocks=np.arange(400),
         courses=force.reshape(-1, BLOCK),
         pushes=np.ones((400, 1)),
@@ -275,15 +275,6 @@ def test_what_slides_is_heard_and_what_lies_still_is_not():
 def test_nothing_that_touches_is_refused():
     with pytest.raises(UserError, match="nothing touches anything within 0.1 s"):
         perform(scene({**BAR, "position": [0, 0, 9.0]}, seconds=0.1), visible=False)
-
-
-def _struck(firsts, since, durations, amplitudes) -> Excitation:
-    modes = amplitudes.shape[1]
-    none = np.zeros(0, np.int64)
-    rows = np.zeros((0, modes))
-    return Excitation(
-        firsts, since, durations, amplitudes, none, np.zeros((0, BLOCK)), rows, none, rows
-    )
 
 
 def _still(place) -> Motion:

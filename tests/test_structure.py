@@ -93,7 +93,7 @@ ARROWS = {
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.design sound.project sound.synthesis""",
     "sound.radiation": "sound",
-    "sound.building": """solver.analysis solver.files solver.response sound sound.clips sound.design
+    "sound.building": """solver.analysis solver.files solver.response sound sound.design
         sound.project sound.rendering""",
     "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement
         solver.response sound sound.project sound.rendering""",

@@ -58,7 +58,7 @@ def run(program: str, main: Callable[[], int | None], comm: Comm = None) -> int:
         return status
     except (Exception, KeyboardInterrupt) as error:
         if isinstance(error, BrokenPipeError) and _nobody_reads():
-            _drop_output()
+            _drop(sys.stdout)
             return 0
         status, sentence = meaning(error)
         if sentence is None:
@@ -155,10 +155,6 @@ def _drop_unwritten() -> None:
                 stream.flush()
         except (OSError, ValueError):
             _drop(stream)
-
-
-def _drop_output() -> None:
-    _drop(sys.stdout)
 
 
 def _drop(stream: TextIO) -> None:

@@ -1,23 +1,13 @@
-"""What it costs a design in sound to be built of real materials."""
+"""Errors, distance and verdict of a design before and after it is built of real materials."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from carillon.arrays import Array
-from sound.clips.targets import Targets
-from sound.design.pitch import cents
+from sound.design.pitch import partials_off
 from sound.project.design import Design
 from sound.rendering.verdict import with_verdict
-
-
-def partials_off(hertz: Array, targets: Targets) -> dict[str, float]:
-    """Median and worst distance [cents] of the partials among frequencies (N,) [Hz] of modes."""
-    off = np.abs(cents(hertz, targets.frequencies))[targets.sounding]
-    return {"median_cents": float(np.median(off)), "worst_cents": float(off.max())}
 
 
 def with_cost_of_build(field: Design, design: Design) -> Design:

@@ -13,7 +13,6 @@ from carillon.errors import ConvergenceError, UserError
 from carillon.processes.threads import one_thread
 from solver.files.modes_file import frequencies
 from solver.response.dissipation import is_known
-from sound.building.cost_of_build import partials_off
 from sound.building.flips import FlipLimits, improved
 from sound.building.grouping import cubes, width_of
 from sound.building.rounding import roundings
@@ -21,7 +20,7 @@ from sound.building.voxel_solid import VoxelModes, VoxelSolid
 from sound.design.interrupts import interruptible
 from sound.design.objective import DesignCost, Objective
 from sound.design.outcome import FINAL_TOLERANCE, own_damping
-from sound.design.pitch import stretch_to
+from sound.design.pitch import partials_off, stretch_to
 from sound.design.preparation import DesignProblem
 from sound.project.build import BuildSettings
 from sound.project.design import Design

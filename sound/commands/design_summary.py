@@ -1,4 +1,4 @@
-"""What `carillon design` tells of the design that it made."""
+"""Summary of a design as `carillon design` prints it: plain values, and sentences."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ STIFFEST, SOFTEST = 1.2e12, 1e6
 
 def summarise(design: Design) -> dict[str, Any]:
     """The outcome as plain values."""
-    from sound.design.pitch import cents, rms_off_partials
+    from sound.design.pitch import partials_off, rms_off_partials
 
     evidence, targets = design.evidence, design.targets
     which = targets.sounding
-    off = np.abs(cents(design.frequencies, targets.frequencies))[which]
+    off = partials_off(design.frequencies, targets)
     assert design.damping is not None
     ratios = (design.damping.dampings / targets.dampings)[which]
     loss = design.damping.loss_factors
@@ -49,8 +49,8 @@ def summarise(design: Design) -> dict[str, Any]:
         "left_out_share_of_loudness": targets.left_out_share,
         "targets": [strike.name for strike in design.strikes],
         "target_distances_m": [strike.distance for strike in design.strikes],
-        "frequency_error_median_cents": float(np.median(off)),
-        "frequency_error_max_cents": float(off.max()),
+        "frequency_error_median_cents": off["median_cents"],
+        "frequency_error_max_cents": off["worst_cents"],
         "coarse_rms_cents": rms_off_partials(design.coarse_frequencies, targets),
         "fine_rms_cents": None
         if design.fine is None
@@ -72,7 +72,7 @@ def summarise(design: Design) -> dict[str, Any]:
 
 
 def _regions(design: Design) -> list[dict[str, Any]]:
-    """What the regions of a design have become, in their order."""
+    """Name, moduli, density and Poisson's ratio of the regions of a design, in their order."""
     table = design.model.regions
     rows = np.zeros(len(design.young), int) if design.fine_region is None else design.fine_region
     found = []
@@ -169,7 +169,7 @@ def _material_sentences(design: Design, summary: dict[str, Any]) -> list[str]:
 
 
 def _build_sentences(build: dict[str, Any] | None) -> list[str]:
-    """What a design is built of, and what that costs."""
+    """Shares of the materials, and errors before and after; empty of a continuous field."""
     if build is None:
         return []
     used = [each for each in build["materials"] if each["volume_m3"]]

@@ -61,6 +61,12 @@ def rms_cents(frequencies: Array, targets: Array) -> float:
     return float(np.sqrt(np.mean(cents(scaled, targets) ** 2)))
 
 
+def partials_off(hertz: Array, targets: Targets) -> dict[str, float]:
+    """Median and worst distance [cents] of the partials among frequencies (N,) [Hz] of modes."""
+    off = np.abs(cents(hertz, targets.frequencies))[targets.sounding]
+    return {"median_cents": float(np.median(off)), "worst_cents": float(off.max())}
+
+
 def bark(frequencies: Array) -> Array:
     """Critical-band rate [bark] of frequencies [Hz] (Zwicker and Terhardt 1980, in [ZF99]).
 

@@ -13,6 +13,7 @@ from carillon.composition.materials import MATERIALS, named_material
 from carillon.errors import UserError
 from carillon.fem.regions import Regions
 from carillon.parameters import REQUIRED, OneOf, Within, option, parameters
+from carillon.parameters.fields import parameters_of
 from carillon.parameters.quantities import (
     Density,
     Length,
@@ -51,7 +52,7 @@ class OwnMaterial:
 
         Raises UserError for a material that there is not, or constants that no material has.
         """
-        given = {key: getattr(self, key) for key in OwnMaterial.__dataclass_fields__}  # type: ignore[attr-defined]
+        given = {key: getattr(self, key) for key in parameters_of(OwnMaterial)}
         entry = RegionEntry(**given)
         row, axes = entry.row(), entry.axes()
         if not isinstance(axes, np.ndarray):

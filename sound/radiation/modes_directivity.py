@@ -45,15 +45,18 @@ def modes_directivity(
     `sound.radiation.sphere` has it, which a line tells.  Raises UserError if bempp-cl is not
     installed.
     """
-    sphere = radiated(motion(shape.vertices), shape, frequencies).directivity
+
+    def sphere() -> Directivity:
+        return radiated(motion(shape.vertices), shape, frequencies).directivity
+
     audible = frequencies[frequencies < HIGHEST_HERTZ]
     if not len(audible):
-        return sphere
+        return sphere()
     try:
         mesh = boundary_mesh(shape.vertices, shape.faces, _triangles(shape, audible[-1]))
     except UserError as error:
         say(f"{name!r} is heard as a sphere of its surface moves the air: {error}")
-        return sphere
+        return sphere()
     highest = SOUND_SPEED / (FEWEST_EDGES_PER_WAVE * _edge(mesh))
     count = int(np.searchsorted(audible, highest))
     if count < len(audible):
@@ -62,7 +65,7 @@ def modes_directivity(
             f"boundary elements ({counted(len(audible) - count, 'mode')})"
         )
     if not count:
-        return sphere
+        return sphere()
     moved, low = motion(mesh.vertices)[:, :, :count], frequencies[:count]
     key = hashlib.sha256(repr((_VERSION, FEWEST_EDGES_PER_WAVE)).encode())
     for values in (mesh.vertices, mesh.faces.astype(float), moved, low):
@@ -74,14 +77,14 @@ def modes_directivity(
         return radiated_by_elements(mesh, moved, low, groups)
 
     solved = remembered("directivity", key.hexdigest(), found, _read, _write)
-    return solved.with_modes_after(sphere)
+    return solved if count == len(frequencies) else solved.with_modes_after(sphere())
 
 
 def _triangles(shape: Shape, highest: float) -> int:
     """Number of triangles that resolve waves of the highest frequency [Hz]."""
-    corners = shape.vertices[shape.faces]
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = float(np.linalg.norm(doubled, axis=1).sum() / 2.0)
+    import trimesh
+
+    area = float(trimesh.triangles.area(shape.vertices[shape.faces]).sum())
     edge = SOUND_SPEED / highest / EDGES_PER_WAVE
     wanted = area / (np.sqrt(3.0) / 4.0 * edge**2)
     return int(np.clip(wanted, FEWEST_TRIANGLES, MOST_TRIANGLES))

@@ -8,6 +8,7 @@ import numpy as np
 
 from carillon.arrays import Array
 from sound.clips.targets import Targets
+from sound.levels import faded
 from sound.project.design import Design
 from sound.rendering.clip_level import clip_level, resampled
 from sound.rendering.solid import SoundingSolid
@@ -81,10 +82,7 @@ class Listening:
 
 def _begun(noise: Array, rate: int) -> Array:
     """Noise (s,) that begins from 0 by half a cosine."""
-    count = min(len(noise), round(BEGIN_SECONDS * rate))
-    begun = noise.copy()
-    begun[:count] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / max(count, 1))
-    return begun
+    return faded(noise[::-1], rate, BEGIN_SECONDS)[0][::-1]
 
 
 def near_weights(points: Array, positions: Array) -> Array:

@@ -13,6 +13,8 @@ GROUND_NAME = "ground"
 """What lists and scenes call the floor."""
 LISTED = 10
 """Greatest number of objects that a message lists."""
+RadiationMethod = bool | Literal["boundary-elements"]
+"""Whether bodies move the air, as spheres of their surfaces if True, or as the solids they are."""
 
 
 def _in_time(path: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
@@ -76,7 +78,7 @@ class SoundEntry:
         "sound pressure of full scale [Pa]; auto lets the loudest sample just reach it, if that is "
         "not below the threshold of hearing (2e-5 Pa)",
     )
-    radiation: bool | Literal["boundary-elements"] = option(
+    radiation: RadiationMethod = option(
         True,
         "whether modes and the motion of the whole body are heard as they move the air, a solid "
         "as a sphere of its surface, or by boundary-elements as the solid that it is, which takes "

@@ -13,7 +13,6 @@ the pressure rho c v / (k r |h_1'(ka)|) of a sphere that moves at v = A / s beco
 """
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ from sound.scenes.audible.excitation import mean_places
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import HertzImpact
 from sound.scenes.performance import Voice
+from sound.scenes.scene import RadiationMethod
 from sound.synthesis.driven import pulse
 
 MATCHED_HERTZ = 10_000.0
@@ -35,7 +35,7 @@ MATCHED_HERTZ = 10_000.0
 sampling rate if that is less."""
 
 
-def mode_directivity(body: Body, radiation: bool | Literal["boundary-elements"]) -> Directivity:
+def mode_directivity(body: Body, radiation: RadiationMethod) -> Directivity:
     """Directivity [Pa m] of a body's modes per amplitude, at 0 dB.
 
     Each mode of a body without clips is as loud as its surface moves the air.  The modes of a

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from sound.scenes.audible.sustained_contact import SustainedForce, sustained_for
 from sound.scenes.bodies import Body
 from sound.scenes.contact.engine import Course
 from sound.scenes.contact.impacts import HertzImpact, SustainedContact
-from sound.scenes.scene import EngineEntry, SoundEntry
+from sound.scenes.scene import EngineEntry, RadiationMethod, SoundEntry
 from sound.synthesis.driven import Gains, ring
 
 AT_ONCE = 16
@@ -132,7 +131,7 @@ def sustained_forces(
 
 
 def directivities_of(
-    bodies: Sequence[Body], radiation: bool | Literal["boundary-elements"], threads: int
+    bodies: Sequence[Body], radiation: RadiationMethod, threads: int
 ) -> list[Directivity | None]:
     """Directivity of each body's modes, None of a silent one; found once for those that share them.
 
