@@ -874,8 +874,8 @@ class Design:
 
     @property
     def build(self) -> dict[str, Any] | None:
-        """What it is built of, and what that costs: errors of the partials [cents] and distance
-        from the clip [dB] before and after; None of a field, see `build` of a project."""
+        """Materials that it is built of, errors of the partials [cents] and distance from the clip
+        [dB] before and after; None of a continuous field, see `build` of a project."""
         return self.found.evidence.get("build")
 
     def export(self, path: str | Path, points: int = 0, format: str | None = None) -> None:

@@ -152,7 +152,7 @@ class VoxelSolid:
     def _mass_products(
         self, at: VoxelModes, model: ElasticModel, forces: Array, pairs: Index, others: Array
     ) -> Array:
-        """What density 1 of each voxel adds (M, P + T N) to the place of the stiffness."""
+        """Products (M, P + T N) like those of the stiffness, by each voxel's mass at density 1."""
         values, count = at.values, len(at.values)
         unit = coarse_cell_mass().sum(axis=0) * (self.mesh.edge / 2.0) ** 3
         factor = np.kron(np.linalg.cholesky(unit).T, np.eye(3)).reshape(4, 6, 24)
@@ -185,7 +185,7 @@ def _others(at: VoxelModes, forces: Array) -> Array:
 
 
 def _held(setting: Setting, table: Regions) -> Supports | None:
-    """What holds the solid, as stiff as its materials ask for."""
+    """Supports as stiff beside the stiffest material as they were beside the search's."""
     supports = setting.supports
     if supports is None or setting.objective.absolute:
         return supports

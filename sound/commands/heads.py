@@ -44,7 +44,7 @@ class HeadsOptions:
 
 @parameters
 class BlendOptions:
-    """What is blended, by one of the two; all heads alike if by none."""
+    """Weights of the blend, given or of a calibration; those of all heads are alike if by none."""
 
     mix: tuple[str, ...] | None = option(
         None,

@@ -186,7 +186,7 @@ def _part(told: Mapping[str, Any], file: str, vertices: Array, faces: Index) -> 
 
 
 def _told(design: Design) -> list[Mapping[str, Any]]:
-    """What the materials of a design are, in the order of its table."""
+    """Entries of the materials of a design, in the order of its table."""
     build = design.evidence.get("build")
     if not build or design.fine_region is None:
         raise UserError(
@@ -235,7 +235,7 @@ def _manifold(vertices: Array, faces: Integers) -> Any:
 
 
 def _clipped(vertices: Array, faces: Index, cutter: Any) -> tuple[Array, Index]:
-    """What of a surface is inside of another one, without traces of rounding."""
+    """The part of a surface inside of another one, without crumbs of rounding."""
     import manifold3d
 
     common = _manifold(vertices, faces) ^ cutter
