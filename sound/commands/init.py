@@ -86,12 +86,12 @@ def _writable(path: str) -> Path:
     from carillon.files.paths import require_writable
     from sound.outputs import require_output
 
-    is_new = not os.path.isdir(path) and not Path(path).suffix
+    is_new = not os.path.isdir(path) and (path.endswith("/") or not Path(path).suffix)
     file = Path(path, DEFAULT_NAME) if is_new or os.path.isdir(path) else Path(path)
     if os.path.lexists(file):
         raise UserError(f"{file}: is there already; name another file, or remove it first")
     if is_new:
-        require_writable(path)
+        require_writable(str(file.parent))
         return file
     return require_output(file, ENDINGS)
 

@@ -217,10 +217,13 @@ def test_people_read_what_is_measured_and_what_is_modelled(study, tmp_path):
     found, _ = study
     lines = study_lines(found)
     assert lines[0].startswith("strong scaling")
-    models = [found[kind]["model"] for kind in ("strong", "weak")]
-    assert all(model["fit"] in lines for model in models)
-    far = [line for line in lines if "1024 ranks" in line and "model" in line]
-    assert len(far) == sum(model["misfit"] <= MISFIT_LIMIT for model in models)
+    for scaling in (found["strong"], found["weak"]):
+        assert scaling["model"]["fit"] in lines
+        measured = {run["ranks"] for run in scaling["runs"]}
+        for row in scaling["model"]["rows"]:
+            about = [line for line in lines if f" {row['ranks']} ranks" in line]
+            assert any("model" in line for line in about)
+            assert all("unknowns" in line for line in about) or row["ranks"] not in measured
     save_plot({**found, "weak": None}, tmp_path / "strong.svg")
     assert (tmp_path / "strong.svg").read_text().startswith("<?xml")
 

@@ -124,7 +124,7 @@ hostile("init of a name that is not printed", f"{INIT} --clips 'a\tb.wav'")
 each(
     "init to",
     "init VALUE --mesh builtin:bar",
-    "p.txt p nowhere/p.yaml /proc/p.yaml /proc LONG.yaml p.yaml/",
+    "p.txt nowhere/p.yaml /proc/p.yaml /proc/p /proc LONG.yaml LONG",
 )
 for kind in ("null", "full", "pipe", "socket", "link"):
     hostile(f"init to {kind}", INIT, "there already", files={"p.yaml": Place(kind, "nowhere")})
@@ -410,6 +410,8 @@ control(
 )
 control("init", f"{INIT} --clips ZOO/metal.wav ZOO/wood.wav", "p.yaml")
 control("init here", "init --mesh builtin:bell", "project.yaml")
+control("init of a folder", "init p --mesh builtin:bell", "p", "p/project.yaml")
+control("init of a folder by a slash", "init p.yaml/ --mesh builtin:bell", "p.yaml/project.yaml")
 control("clip by a link", "clip metal --seconds 0.3 --out ./o.wav", "o.wav")
 control(
     "project with a mark of its order of bytes",
