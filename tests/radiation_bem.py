@@ -7,7 +7,8 @@ swing and flatten, for which there is a theory.  Then the level of each mode of 
 all directions, is printed by the finest triangles, and how far off it are coarser ones, the sphere
 of `sound.radiation.sphere`, and the plainest approximation: a sphere of the same surface whose
 velocity in the direction x/|x| is that of the solid in x.  The last columns are the rms over single
-directions, those in which the mode is less than 20 dB below its mean.
+directions, those in which the mode is less than 20 dB below its mean: by coarser triangles, by that
+sphere as a monopole and a dipole, and by it with the phases of all orders, as places are heard.
 """
 
 import argparse
@@ -23,7 +24,7 @@ from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.boundary_elements import radiated_by_elements
 from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
 from sound.radiation.directivity import Directivity, even_directions
-from sound.radiation.sphere import radiated
+from sound.radiation.sphere import radiated, sphere_directivity
 from sound.scenes.bodies import Body, bodies_of, with_modes
 from sound.scenes.object_entry import ObjectEntry
 from sound.shape import Shape
@@ -101,6 +102,12 @@ def approximation(vibrating: VibratingSurface) -> Directivity:
     """Directivity by `sound.radiation.sphere`."""
     shape = Shape.of_surface(vibrating.mesh.vertices, vibrating.mesh.faces, np.zeros(3))
     return radiated(vibrating.motion, shape, vibrating.frequencies).directivity
+
+
+def all_phases(vibrating: VibratingSurface) -> Directivity:
+    """Directivity of that sphere with the phases of all orders."""
+    shape = Shape.of_surface(vibrating.mesh.vertices, vibrating.mesh.faces, np.zeros(3))
+    return sphere_directivity(vibrating.motion, shape, vibrating.frequencies)
 
 
 def plain_power(vibrating: VibratingSurface) -> Array:
@@ -181,6 +188,7 @@ def compare(name: str, triangles: list[int]) -> None:
     columns["plainest"] = level(plain_power(finest)) - truth
     columns[f"{triangles[0]:,} by direction"] = off_by_direction(found[0], found[-1])
     columns["sphere by direction"] = off_by_direction(ball, found[-1])
+    columns["with all phases"] = off_by_direction(all_phases(finest), found[-1])
     print(f"\n{name}, {triangles[-1]:,} triangles, a = {1e3 * radius:.1f} mm; off by [dB]")
     print(f"{'mode':>4} {'Hz':>8} {'ka':>6} {'level':>8}  " + "  ".join(columns))
     rows = np.stack(list(columns.values()), axis=1)

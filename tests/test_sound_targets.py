@@ -13,7 +13,7 @@ from sound.clips.audibility import erb_number, heard_partials
 from sound.clips.extraction import ModalSound
 from sound.clips.targets import APART, MOST_MODES, share_frequencies
 from sound.clips.wav import read_wav, write_wav
-from sound.design.objective import RESOLVED
+from sound.design.resolved import RESOLVED
 
 RATE = 8000
 

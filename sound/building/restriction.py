@@ -82,7 +82,9 @@ class _Restriction:
         self._is_free = settings.size == "free" and not setting.objective.absolute
         objective = setting.objective
         if not self._is_free and not objective.absolute:
-            objective = Objective(objective.targets, objective.weights, absolute=True)
+            objective = Objective(
+                objective.targets, objective.weights, absolute=True, heard=objective.heard
+            )
         self._objective = objective
         self._solid = VoxelSolid(setting, self._choices.table, objective)
 
@@ -184,6 +186,9 @@ class _Restriction:
             count = np.arange(len(hertz))
             elastic = modes[:, found.modes.rigid :]
             damping = own_damping(model, values[found.modes.rigid :], elastic, count, hertz)
+        heard, transfer = None, self._objective.heard
+        if transfer is not None:
+            heard = transfer.heard(model, modes[:, found.modes.rigid :], hertz)
         unit = size * float(design.settings.get("unit", 1.0))
         return replace(
             design,
@@ -200,6 +205,7 @@ class _Restriction:
             fine=None,
             damping=damping,
             fine_region=found.numbers,
+            heard=heard,
         )
 
     def _evidence(

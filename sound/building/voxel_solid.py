@@ -28,8 +28,8 @@ from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from sound.design.elements import analysed_elements
 from sound.design.modal_truncation import outside_response, shift_between
-from sound.design.objective import DesignCost, Objective, Sensitivity
-from sound.design.sensitivity import close_pairs, energies_of_cells, inside_response
+from sound.design.objective import DesignCost, Objective
+from sound.design.sensitivity import Sensitivity, close_pairs, energies_of_cells, inside_response
 from sound.design.simulation import RESPONSE, pushes
 from sound.design.tasks import Setting
 
@@ -100,7 +100,7 @@ class VoxelSolid:
         rows = np.empty((len(order), kept))
         rows[order] = modes.vectors[:, :kept]
         values, elastic = modes.values[modes.rigid : kept], rows[:, modes.rigid :]
-        pushed = pushes(model, self._setting.strikes).T @ elastic
+        pushed = self._forces(model).T @ elastic
         cost = self.objective.cost(values, pushed, 0.0)
         rigid = rows[:, : modes.rigid]
         return VoxelModes(numbers, values, pushed, elastic, rigid, cost, modes, solver, order)
@@ -117,7 +117,7 @@ class VoxelSolid:
         c between 0.4 and 0.6 (Eshelby 1957), by which the change of the stiffness is multiplied.
         """
         model, values, table = self.model(at.numbers), at.values, self.table
-        forces = pushes(model, self._setting.strikes)
+        forces = self._forces(model)
         others = _others(at, forces)
         pairs = close_pairs(values)
         mass = self._mass_products(at, model, forces, pairs, others)
@@ -148,6 +148,9 @@ class VoxelSolid:
         flat = totals.reshape(count * materials, -1)
         inside, beyond = flat[:, : len(pairs)], flat[:, len(pairs) :]
         return Sensitivity(pairs, inside, beyond.reshape(-1, *others.shape[1:]))
+
+    def _forces(self, model: ElasticModel) -> Array:
+        return pushes(model, self._setting.strikes, self.objective.heard)
 
     def _mass_products(
         self, at: VoxelModes, model: ElasticModel, forces: Array, pairs: Index, others: Array

@@ -23,7 +23,7 @@ Psychology of Hearing, ch. 6).
 """
 APART = 3e-3
 """Greatest relative difference of two frequencies that count as one mode of a design, as it
-averages their amplitudes, see `sound.design.objective.RESOLVED`."""
+averages their amplitudes, see `sound.design.resolved.RESOLVED`."""
 HEARD = 1e-3
 """Least amplitude of an audible mode, over that of the clip's loudest (-60 dB)."""
 MOST_MODES = 30

@@ -2,11 +2,8 @@
 
 Two decisions make the amplitudes of Eq. (2) differentiable.  A mode has no sign, so magnitudes are
 compared.  And modes of equal frequency have no shapes of their own, only a common span, so energies
-are averaged within the width that the ear resolves,
-
-    b_k = sum_i w((f_i - f_k) / f_k) a_i^2 / sum_i w((f_i - f_k) / f_k),   w a Gaussian,
-
-which is a_k^2 for a mode on its own.  The targets' amplitudes are averaged likewise.
+are averaged within the width that the ear resolves, see `sound.design.resolved`.  The targets'
+amplitudes are averaged likewise.
 
 Eq. (2) leaves the first mode out, as Eq. (1) has to.  Here it counts like the others: otherwise it
 would become too loud wherever that helps the others.
@@ -19,38 +16,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from carillon.arrays import Array, Index
+from carillon.arrays import Array
 from solver.files.modes_file import frequencies
-from solver.subspace.weyl import clusters
 from sound.design.pitch import bark, bark_slope
+from sound.design.resolved import (
+    average,
+    eigenvalue_slopes,
+    heard_energies,
+    heard_energy_slopes,
+    struck_energies,
+    struck_energy_slopes,
+)
 
 if TYPE_CHECKING:
     from sound.clips.targets import Targets
+    from sound.design.sensitivity import Sensitivity
     from sound.project.settings import Weights
+    from sound.radiation.transfer import Transfer
 
 
-RESOLVED = 3e-3
-"""Standard deviation of the average over neighbouring modes, over their frequency: about the least
-difference of two tones that the ear resolves."""
-CLUSTER = 1e-6
-"""Relative difference below which eigenvalues count as equal."""
-EQUAL = 1e-9
-"""Relative difference of eigenvalues below which a derivative replaces a divided difference."""
 TINY = 1e-30
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Derivatives of eigenpairs by m coordinates, projected on pairs of modes and struck points.
-
-    `pairs` (P, 2) are numbers i <= j of elastic modes of close eigenvalues, first all with i = j,
-    and `stiffness` (m, P) [rad^2/s^2] is u_i^T (dK/dz) u_j of these.  `outside` (m, T, N) is the
-    part of the derivative of each pushed mode outside of the modes close to it.
-    """
-
-    pairs: Index
-    stiffness: Array
-    outside: Array
 
 
 @dataclass(frozen=True)
@@ -69,6 +54,9 @@ class Objective:
     `targets` are the modes that the points shall have; `shift` (T, N) is added to their balances of
     amplitudes. Frequencies are relative to the first partial, or as they are if `absolute`: those
     of a solid whose supports give it a scale of its own. Those of silent modes do not count.
+
+    With `heard`, amplitudes are those in the direction of that transfer, and the rows of `pushed`
+    go on with the products of its r patterns with the modes.
     """
 
     def __init__(
@@ -77,15 +65,17 @@ class Objective:
         weights: Weights,
         shift: Array | None = None,
         absolute: bool = False,
+        heard: Transfer | None = None,
     ) -> None:
         self.targets = targets
         self.weights = weights
         self.absolute = absolute
+        self.heard = heard
         self._bark = bark(targets.frequencies)
         self._first = int(targets.sounding[0])
         self.compared = targets.sounding if absolute else targets.sounding[1:]
         """Numbers (p,) of the modes that have differences of frequency."""
-        energies = _average(targets.frequencies, targets.amplitudes**2)
+        energies = average(targets.frequencies, targets.amplitudes**2)
         self._target = np.sqrt(energies / np.maximum(energies.max(axis=1, keepdims=True), TINY))
         if shift is not None:
             self._target = self._target + shift
@@ -100,7 +90,7 @@ class Objective:
 
     def cost(self, eigenvalues: Array, pushed: Array, regulariser: float) -> DesignCost:
         """Eq. (4), from ascending elastic eigenvalues (N,) [rad^2/s^2], R, and u_k^T f (T, N)
-        [kg^-1/2 N s] of unit impulses f along the inward normals.
+        [kg^-1/2 N s] of unit impulses f along the inward normals, and of patterns if there are any.
         """
         frequency = 0.5 * float(np.sum(self.frequency_residual(eigenvalues) ** 2))
         amplitude = 0.5 * float(np.sum(self.amplitude_residual(eigenvalues, pushed) ** 2))
@@ -111,17 +101,15 @@ class Objective:
     def frequency_jacobian(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
         """Derivatives (p, m) of `frequency_residual`."""
         scaled = self._scaled(eigenvalues)
-        relative = 0.5 * _slopes(eigenvalues, sensitivity) / eigenvalues
-        if not self.absolute:
-            relative = relative - relative[:, self._first, None]
-        rows = (bark_slope(scaled) * scaled) * relative
+        rows = (bark_slope(scaled) * scaled) * self._relative_slopes(eigenvalues, sensitivity)
         return np.asarray(rows.T[self.compared])
 
     def amplitude_jacobian(
         self, eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
     ) -> Array:
         """Derivatives (T, N, m) of `amplitude_residual`."""
-        energies, slopes = _average_slopes(eigenvalues, pushed, sensitivity)
+        energies = self._energies(eigenvalues, pushed)
+        slopes = self._energy_slopes(eigenvalues, pushed, sensitivity)
         largest = energies.argmax(axis=1)
         points = np.arange(len(energies))
         peak = energies[points, largest][:, None]
@@ -141,69 +129,27 @@ class Objective:
 
     def balance(self, eigenvalues: Array, pushed: Array) -> Array:
         """Amplitudes (T, N) of modes over the loudest at each point; `cost` has the parameters."""
-        energies = _average(np.sqrt(eigenvalues), pushed**2)
+        energies = self._energies(eigenvalues, pushed)
         return np.asarray(np.sqrt(energies / energies.max(axis=1, keepdims=True)))
 
+    def _energies(self, eigenvalues: Array, pushed: Array) -> Array:
+        """Squared amplitudes (T, N)."""
+        if self.heard is None:
+            return struck_energies(eigenvalues, pushed[: len(self._target)])
+        return heard_energies(eigenvalues, pushed, self._scaled(eigenvalues), self.heard)
 
-def _kernel(frequencies: Array) -> Array:
-    """Weights (N k, N i) of mode i in the average around mode k, not normalised."""
-    distance = frequencies[None, :] / frequencies[:, None] - 1.0
-    return np.asarray(np.exp(-0.5 * (distance / RESOLVED) ** 2))
+    def _energy_slopes(self, eigenvalues: Array, pushed: Array, sensitivity: Sensitivity) -> Array:
+        """Their derivatives (T, N, m)."""
+        if self.heard is None:
+            return struck_energy_slopes(eigenvalues, pushed[: len(self._target)], sensitivity)
+        hertz = self._scaled(eigenvalues)
+        relative = self._relative_slopes(eigenvalues, sensitivity)
+        return heard_energy_slopes(eigenvalues, pushed, hertz, relative, sensitivity, self.heard)
 
-
-def _average(frequencies: Array, energies: Array) -> Array:
-    """b_k (T, N) of squared amplitudes (T, N)."""
-    kernel = _kernel(frequencies)
-    return np.asarray(energies @ (kernel / kernel.sum(axis=1, keepdims=True)).T)
-
-
-def _slopes(eigenvalues: Array, sensitivity: Sensitivity) -> Array:
-    """Derivatives (m, N) of the eigenvalues; equal eigenvalues have the mean of theirs.
-
-    Equal eigenvalues have no derivatives one by one, as any change separates them.  Their mean has
-    one; for a pair, central differences find it, too.
-    """
-    slopes = sensitivity.stiffness[:, : len(eigenvalues)].copy()
-    for group in clusters(eigenvalues, CLUSTER):
-        slopes[:, group] = slopes[:, group].mean(axis=1, keepdims=True)
-    return np.asarray(slopes)
-
-
-def _average_slopes(
-    eigenvalues: Array, pushed: Array, sensitivity: Sensitivity
-) -> tuple[Array, Array]:
-    """b_k (T, N) and its derivatives (T, N, m).
-
-    With h_k(lambda) the kernel as a function of the eigenvalue, the sum over i of h_k(lambda_i)
-    a_i^2 is f^T U h_k(Lambda) U^T f.  Its derivative is that of a function of a matrix: for modes
-    close to each other divided differences of h_k stand where the eigenvectors' derivatives would
-    have differences of eigenvalues in their denominators, and stay finite where these vanish.
-    """
-    frequencies = np.sqrt(eigenvalues)
-    kernel = _kernel(frequencies)
-    total = kernel.sum(axis=1)
-    energies = pushed**2 @ kernel.T / total
-    ratio = frequencies[None, :] / frequencies[:, None]
-    # Derivative of the kernel (k, i) with respect to eigenvalue i; that to k is opposite in scale.
-    by_own = -kernel * (ratio - 1.0) * ratio / (2.0 * RESOLVED**2 * eigenvalues[None, :])
-    by_centre = -by_own * eigenvalues[None, :] / eigenvalues[:, None]
-    i, j = sensitivity.pairs.T
-    gaps = eigenvalues[i] - eigenvalues[j]
-    equal = np.abs(gaps) <= EQUAL * eigenvalues[i]
-    divided = (kernel[:, i] - kernel[:, j]) / np.where(equal, 1.0, gaps)
-    divided = np.where(equal, 0.5 * (by_own[:, i] + by_own[:, j]), divided)
-    divided *= np.where(i == j, 1.0, 2.0)
-    values = _slopes(eigenvalues, sensitivity)
-    m, count = values.shape
-    slopes = np.empty((len(pushed), count, m))
-    for point, a in enumerate(pushed):
-        slopes[point] = (divided * (a[i] * a[j])) @ sensitivity.stiffness.T
-        slopes[point] += (2.0 * kernel * a) @ sensitivity.outside[:, point].T
-        # The centre of the average depends on z, too, and so does its sum of weights.
-        moved = (by_centre @ a**2)[:, None] * values.T
-        lost = energies[point][:, None] * (by_own @ values.T + by_centre.sum(1)[:, None] * values.T)
-        slopes[point] = (slopes[point] + moved - lost) / total[:, None]
-    return energies, slopes
+    def _relative_slopes(self, eigenvalues: Array, sensitivity: Sensitivity) -> Array:
+        """Derivatives (m, N) of the logarithms of the scaled frequencies."""
+        relative = 0.5 * eigenvalue_slopes(eigenvalues, sensitivity) / eigenvalues
+        return relative if self.absolute else relative - relative[:, self._first, None]
 
 
 def fall(start: float, end: float) -> float:

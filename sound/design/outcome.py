@@ -147,6 +147,10 @@ class Outcome:
                     order,
                     targets,
                 )
+        heard = None
+        if setting.objective.heard is not None:
+            elastic = modes[:, evaluation.modes.rigid :][:, order]
+            heard = setting.objective.heard.heard(model, elastic, stretch * hertz)
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
             "method": problem.project.optimiser.method,
@@ -185,6 +189,7 @@ class Outcome:
             fine=None if fine is None else FineFrequencies(stretch * hertz, fine.order),
             damping=damping,
             fine_region=None if setting.placed is None else setting.placed.region,
+            heard=heard,
         )
 
 

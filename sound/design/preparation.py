@@ -17,7 +17,7 @@ from carillon.fem.elasticity import Elasticity
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import fine_model
+from carillon.fem.model import fine_model, mass_properties
 from carillon.fem.regions import Regions
 from carillon.fem.supports import Supports
 from carillon.processes.threads import allowed_cores, one_thread
@@ -29,13 +29,16 @@ from sound.clips.targets import Targets, share_frequencies, without_modes
 from sound.clips.wav import read_wav
 from sound.design.assignment import SolidSpectrum, assigned
 from sound.design.constants import NOTHING, FreeConstants, free_density, free_poisson
-from sound.design.elements import coarsening_of
+from sound.design.elements import analysed_elements, coarsening_of
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
 from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
+from sound.radiation.place import transfer_to
+from sound.radiation.transfer import Transfer
+from sound.shape import Shape
 from sound.strikes import Strike
 
 MODES = 40
@@ -183,9 +186,25 @@ def prepare(
         sought = assigned(sought, sought.shares, _spectrum(project, solid, strikes))
     targets = sought
     project = replace(project, modes=len(targets.frequencies))
-    objective = Objective(targets, project.weights, absolute=solid.has_scale)
+    heard = _transfer(project, solid, targets)
+    objective = Objective(targets, project.weights, absolute=solid.has_scale, heard=heard)
     setting = solid.setting(project.solid, strikes, objective)
     return DesignProblem(project, np.asarray(surface.vertices), np.asarray(surface.faces), setting)
+
+
+def _transfer(project: Project, solid: PreparedSolid, targets: Targets) -> Transfer | None:
+    """Transfer to the place where a project's design is heard, None without one."""
+    place = project.listen.place(project.unit)
+    if place is None:
+        return None
+    surface = solid.surface
+    elements = analysed_elements(
+        solid.mesh, project.solid, solid.cells, solid.placed, solid.supports
+    )
+    centre = mass_properties(elements.model).centre
+    shape = Shape.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), centre)
+    hertz = float(targets.frequencies[0]), float(targets.frequencies[-1])
+    return transfer_to(place, shape, centre, hertz, project.mesh)
 
 
 def _spectrum(project: Project, solid: PreparedSolid, strikes: Sequence[Strike]) -> SolidSpectrum:

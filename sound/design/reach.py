@@ -19,11 +19,12 @@ from carillon.errors import UserError
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.design.descent import DescentLimits
-from sound.design.objective import Objective, Sensitivity
+from sound.design.objective import Objective
 from sound.design.pitch import cents
 from sound.design.pool import Pool
 from sound.design.preparation import DesignProblem, coordinates_of
 from sound.design.reduced_model import TrustRegion
+from sound.design.sensitivity import Sensitivity
 from sound.design.tasks import Task, Trial
 from sound.project.design import Design
 from sound.project.settings import Weights

@@ -13,7 +13,7 @@ import scipy.linalg as la
 
 from carillon.arrays import Array
 from sound.design.descent import Descent, DesignDescent
-from sound.design.objective import Sensitivity
+from sound.design.sensitivity import Sensitivity
 from sound.design.simulation import Evaluation
 
 INNER_STEPS = 12

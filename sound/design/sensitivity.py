@@ -8,6 +8,7 @@ one by one.  `modal_truncation` adds the modes that were not computed.
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numba
@@ -22,6 +23,20 @@ CELLS_AT_ONCE = 8
 """Number of elements whose strains are held in memory together."""
 CLOSE = 1e-2
 """Greatest relative difference of the eigenvalues of close modes."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of eigenpairs by m coordinates, projected on pairs of modes and on forces.
+
+    `pairs` (P, 2) are numbers i <= j of elastic modes of close eigenvalues, first all with i = j,
+    and `stiffness` (m, P) [rad^2/s^2] is u_i^T (dK/dz) u_j of these.  `outside` (m, R, N) is the
+    part of the derivative of each product of a force and a mode outside of the modes close to it.
+    """
+
+    pairs: Index
+    stiffness: Array
+    outside: Array
 
 
 class LawElements(NamedTuple):

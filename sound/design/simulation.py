@@ -30,14 +30,15 @@ from sound.design.elements import RegionElements, analysed_elements
 from sound.design.masses import SolidModes, by_density, nodal_mass
 from sound.design.material import FIRST, SECOND, ReducedMaterial, elasticity_slope
 from sound.design.modal_truncation import lies_between, outside_response, shift_between
-from sound.design.objective import Sensitivity
 from sound.design.sensitivity import (
     LawElements,
+    Sensitivity,
     all_pairs,
     close_pairs,
     inside_response,
     projected_stiffness,
 )
+from sound.radiation.transfer import Transfer
 from sound.strikes import Strike
 
 TOLERANCE = 1e-3
@@ -51,8 +52,9 @@ eigenvalues."""
 class Evaluation:
     """The modes of the material of coordinates z (m,).
 
-    `eigenvalues` (N,) [rad^2/s^2] of the elastic modes ascend; `pushed` (T, N) [kg^-1/2 N s] is
-    u_k^T f of a unit impulse f along the inward normal at each point.  `modes` are all of the
+    `eigenvalues` (N,) [rad^2/s^2] of the elastic modes ascend; `pushed` (T + r, N) [kg^-1/2 N s] is
+    u_k^T f of a unit impulse f along the inward normal at each point, and of the r patterns by
+    which modes are heard, if there are any.  `modes` are all of the
     analysis, as a start of the next one.  `sensitivity`, the derivatives, and `inverse`, (K - mu
     M)^-1 of this material, are None if they were not computed.
     """
@@ -78,6 +80,8 @@ class Simulation:
         Struck points; relative error of the eigenvalues.
     placed, supports
         Regions of the voxels, in place of the constants of the options, and what holds the solid.
+    heard
+        Transfer to the place where modes are heard, None if they count as they are struck.
 
     Attributes
     ----------
@@ -96,6 +100,7 @@ class Simulation:
         cells: FiniteCells | None = None,
         placed: PlacedRegions | None = None,
         supports: Supports | None = None,
+        heard: Transfer | None = None,
     ) -> None:
         self.material = material
         self.elements = analysed_elements(mesh, options, cells, placed, supports)
@@ -106,7 +111,7 @@ class Simulation:
         self.solver = ModalSolver(self.model, analysis, MPI.COMM_SELF)
         # Rows of the analysis are in the order of its partition.
         self._order = degrees_of_freedom(self.solver.local_mesh.nodes)
-        self._pushes = pushes(self.model, strikes)[self._order]
+        self._pushes = pushes(self.model, strikes, heard)[self._order]
         self._accuracy = RESPONSE * np.sqrt(tolerance)
 
     @property
@@ -287,8 +292,10 @@ def _lowest(modes: Modes, count: int) -> Modes:
     )
 
 
-def pushes(model: Solid, strikes: Sequence[Strike]) -> Array:
-    """Forces (n_dofs, T) of unit impulses [N s] along the inward normals of struck points."""
+def pushes(model: Solid, strikes: Sequence[Strike], heard: Transfer | None = None) -> Array:
+    """Forces (n_dofs, T + r): unit impulses [N s] along the inward normals of struck points, then
+    the loads of a transfer if there is one."""
     positions = np.array([strike.position for strike in strikes])
     inward = np.array([strike.inward for strike in strikes])
-    return forces_at(model, positions, inward)
+    forces = forces_at(model, positions, inward)
+    return forces if heard is None else np.concatenate([forces, heard.loads(model)], axis=1)

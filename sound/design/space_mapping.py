@@ -75,7 +75,8 @@ def aimed(objective: Objective, fine: FineModes) -> Objective:
         residuals=(),
         silent=None if silent is None else silent[order],
     )
-    return Objective(aims, objective.weights, fine.excess[:, order], objective.absolute)
+    shift = fine.excess[:, order]
+    return Objective(aims, objective.weights, shift, objective.absolute, objective.heard)
 
 
 class SpaceMapping:

@@ -51,6 +51,7 @@ class Setting:
     def simulation(self, tolerance: float = TOLERANCE, modes: int | None = None) -> Simulation:
         """Simulation of the solid, on all threads; of as many modes as targets if None."""
         modes = modes or len(self.objective.targets.frequencies)
+        heard = None if self.objective is None else self.objective.heard
         return Simulation(
             self.mesh,
             self.options,
@@ -61,6 +62,7 @@ class Setting:
             self.cells,
             self.placed,
             self.supports,
+            heard,
         )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array, Integers
+from carillon.arrays import Array, Complex, Integers
 from carillon.errors import UserError
 from carillon.fem.geometry.turning import remaining_turn
 from carillon.fem.geometry.walls import ABOUT, SIDES, WallSize
@@ -20,6 +20,7 @@ from carillon.parameters.quantities import UP_AXES
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.project.build_evidence import is_build, is_number
+from sound.radiation.place import Place
 from sound.strikes import Strike
 
 HISTORY = {
@@ -99,6 +100,10 @@ class Design:
     """Loss factors of the material, and dampings by them; None in old designs."""
     fine_region: RegionOf | None = None
     """(M,) region of each fine cell, a row of the model's regions; None if there is one."""
+    heard: Complex | None = None
+    """(N,) [Pa m / (kg^-1/2 N s)]: pressure times distance of the elastic modes at the place where
+    the design is heard, see `sound.radiation.transfer`; None if its amplitudes are those of the
+    motion at the struck points."""
 
     @property
     def name(self) -> str:
@@ -115,6 +120,14 @@ class Design:
     def up(self) -> str | None:
         """Axis of its mesh that was turned to z; None if its axes are those of the mesh."""
         return self.settings.get("up")
+
+    @property
+    def place(self) -> Place | None:
+        """The place where it is heard; None if its amplitudes are those of the struck points."""
+        listen = self.settings.get("listen", {})
+        by_elements = listen.get("radiation") == "boundary-elements"
+        at = listen.get("at")
+        return None if at is None else Place(self.unit * np.array(at, dtype=float), by_elements)
 
     @property
     def wall(self) -> WallSize | None:
@@ -215,6 +228,8 @@ def fault(design: Design) -> str:
         expected.append(("dampings of the material", design.damping.dampings, (N,)))
         if design.damping.loss_factors is not None:
             expected.append(("loss factors", design.damping.loss_factors, (len(design.young),)))
+    if design.heard is not None:
+        expected.append(("pressures at the place where it is heard", design.heard, (N,)))
     if design.fine_region is not None:
         expected.append(("regions of fine cells", design.fine_region, (len(design.young),)))
     for name, data, shape in expected:
@@ -228,8 +243,9 @@ def fault(design: Design) -> str:
         if isinstance(data, np.ndarray) and data.dtype != bool
     ]
     for name, data in [*numbers, ("frequencies", targets.frequencies), ("moduli", design.young)]:
-        if data.dtype.kind not in "fiu" or not np.isfinite(data).all():
-            return f"holds {name} that are no finite real numbers"
+        kinds = "c" if data is design.heard else "fiu"
+        if data.dtype.kind not in kinds or not np.isfinite(data).all():
+            return f"holds {name} that are no finite numbers"
     if not len(targets.sounding):
         return "holds silent modes alone"
     loudness = targets.loudness
@@ -262,6 +278,7 @@ _SETTINGS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
     "wall_side": (f"one of {', '.join(SIDES)}", lambda value: value in SIDES),
     "material": ("keys and values", lambda value: isinstance(value, Mapping)),
     "damping": ("keys and values", lambda value: isinstance(value, Mapping)),
+    "listen": ("at, null or three numbers", lambda value: _is_listen(value)),
 }
 """Settings of a design that are used: expected kind, and test of each."""
 MOST_LUFS = 400.0
@@ -290,6 +307,15 @@ def _fault_of_texts(design: Design) -> str:
     if build is not None and not is_build(build, len(design.model.regions)):
         return f"holds the evidence build {build!r:.100}, expected what each material is"
     return ""
+
+
+def _is_listen(value: Any) -> bool:
+    if not isinstance(value, Mapping):
+        return False
+    at = value.get("at")
+    return at is None or (
+        isinstance(at, (list, tuple)) and len(at) == 3 and all(is_number(each) for each in at)
+    )
 
 
 def _matches(own: tuple[int, ...], expected: tuple[int | None, ...]) -> bool:

@@ -66,6 +66,11 @@ def put_object(file: h5py.File, design: Design) -> None:
         put(file, "fine/order", design.fine.order, "1", "coarse elastic mode of the same shape")
     if design.damping is not None:
         _put_damping(file["fine"], design.damping)
+    if design.heard is not None:
+        meaning = "pressure times distance of the elastic modes where the design is heard"
+        unit = "Pa m kg^1/2 N^-1 s^-1"
+        put(file, "heard/real", design.heard.real, unit, f"{meaning}, real part")
+        put(file, "heard/imaginary", design.heard.imag, unit, f"{meaning}, imaginary part")
     if design.fine_region is not None:
         put(file, "fine/region", design.fine_region, "1", "region of the fine cells")
 
@@ -100,6 +105,7 @@ def read_design(path: str | Path) -> Design:
             else None,
             _get_damping(fine),
             fine["region"][()].astype(np.uint16) if "region" in fine else None,
+            file["heard/real"][()] + 1j * file["heard/imaginary"][()] if "heard" in file else None,
         )
     wrong = fault(design)
     if wrong:

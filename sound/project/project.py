@@ -34,6 +34,7 @@ from solver.coarsening.forest import FOREST
 from sound.project.build import BuildSettings
 from sound.project.settings import (
     DampingSettings,
+    ListenSettings,
     MaterialSettings,
     OptimiserSettings,
     TargetEntry,
@@ -92,6 +93,9 @@ class Project:
     material: MaterialSettings = option(
         MaterialSettings, "the Young's modulus field that is sought"
     )
+    listen: ListenSettings = option(
+        ListenSettings, "where the design is heard, if its amplitudes are to be those of a place"
+    )
     damping: DampingSettings = option(DampingSettings, "how the modes of a design are damped")
     build: BuildSettings = option(
         BuildSettings, "real materials that the design is built of, once the field is found"
@@ -139,6 +143,12 @@ class Project:
                 ("build",),
                 f"found discretisation: {self.discretisation}, expected voxel; cells that the "
                 "surface cuts are not parts that can be made",
+            )
+        if self.listen.at is not None and self.build.size == "free":
+            raise ParameterError(
+                ("build", "size"),
+                "found free beside listen, expected mesh; a solid of another size radiates "
+                "otherwise",
             )
         if self.build.per == "region" and len(self.regions) < 2:
             raise ParameterError(

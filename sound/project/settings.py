@@ -2,6 +2,8 @@
 
 from typing import Annotated
 
+import numpy as np
+
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.quantities import (
     Density,
@@ -14,6 +16,7 @@ from carillon.parameters.quantities import (
     between,
 )
 from sound.clips.formats import CLIP_FORMATS
+from sound.radiation.place import Place
 
 LEAST_WEIGHT = 1e-12
 """Weight of frequencies or of amplitudes below which a search has nothing to lower."""
@@ -26,6 +29,7 @@ def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
 
 
 ModeCount = Annotated[int, between(1, 10_000)]
+PlaceRadiation = Annotated[str, OneOf("sphere", "boundary-elements")]
 Dampings = Annotated[str, OneOf("clips", "material")]
 """Where dampings of a design come from."""
 OptimiserMethod = Annotated[str, OneOf("hybrid", "cma", "bfgs")]
@@ -64,6 +68,29 @@ class TargetEntry:
         if (self.at is None) == (self.vertex is None):
             given = "neither" if self.at is None else "both"
             raise ValueError(f"expected at or vertex, found {given}")
+
+
+@parameters
+class ListenSettings:
+    """The place at which the amplitudes of a design are those of the clips."""
+
+    at: Point | None = option(
+        None,
+        "position of the listener in the mesh's own coordinates, or as up turns them; what counts "
+        "is the direction in which it lies from the centre of mass, as if it were far away. "
+        "Amplitudes are those of the motion at the struck points if null [mesh unit]",
+    )
+    radiation: PlaceRadiation = option(
+        "sphere",
+        "how the surface moves the air: as one of a sphere of its size does, or by "
+        "boundary-elements as it is, which takes minutes once a mesh, and needs bempp-cl",
+    )
+
+    def place(self, unit: float) -> Place | None:
+        """The place in the coordinates of a solid whose mesh has a unit [m]; None without one."""
+        if self.at is None:
+            return None
+        return Place(unit * np.array(self.at), self.radiation == "boundary-elements")
 
 
 @parameters

@@ -29,13 +29,11 @@ from carillon.errors import UserError, one_line
 from carillon.processes.threads import allowed_threads
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.boundary_mesh import BoundaryMesh
-from sound.radiation.directivity import Directivity, even_directions, harmonics
+from sound.radiation.directivity import Directivity, even_directions, harmonics, order_of
 
 REQUIREMENTS = "workflow/envs/requirements-radiation.txt"
 SAME = 2e-3
 """Relative difference of frequencies [1] up to which modes share a system of equations."""
-ORDERS_BEYOND = 4
-"""Orders of harmonics beyond k R, the wave number times the radius of the solid."""
 POINTS = np.array(
     [
         [0.108103018168070, 0.445948490915965, 0.445948490915965],
@@ -65,11 +63,13 @@ def radiated_by_elements(
     radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
     flows = mesh.flows(motion)
     highest = 2.0 * np.pi * float(frequencies.max()) / SOUND_SPEED
-    coefficients = np.zeros((len(frequencies), (_order(highest * radius) + 1) ** 2), dtype=complex)
+    coefficients = np.zeros(
+        (len(frequencies), (order_of(highest * radius) + 1) ** 2), dtype=complex
+    )
     elements = BoundaryElements(mesh)
     for group in same_frequency(frequencies) if groups is None else groups:
         hertz = float(frequencies[group].mean())
-        order = _order(2.0 * np.pi * hertz / SOUND_SPEED * radius)
+        order = order_of(2.0 * np.pi * hertz / SOUND_SPEED * radius)
         directions, shares = even_directions(2 * order)
         pressures = elements.far_field(flows[:, group], hertz, directions)
         projected = (shares[:, None] * harmonics(order, directions)).T @ pressures
@@ -96,14 +96,26 @@ class BoundaryElements:
 
         The surface moves at a frequency [Hz] by flows (V, N) [m^3/s], see `BoundaryMesh.flows`.
         """
-        from bempp_cl.api.operators.boundary import helmholtz
-
         number = 2.0 * np.pi * hertz / SOUND_SPEED
-        system = self._half - self._matrix(helmholtz.double_layer, number)
-        system += (1j / number) * self._matrix(helmholtz.hypersingular, number)
-        answers = np.linalg.solve(system.T, flows.astype(complex))
+        answers = np.linalg.solve(self._system(number).T, flows.astype(complex))
         pressures = self._waves(number, directions).T @ answers
         return np.asarray(-1j * AIR_DENSITY * SOUND_SPEED * number / (4.0 * np.pi) * pressures)
+
+    def field(self, hertz: float, direction: Array) -> Complex:
+        """Field (V,) [Pa m / (m^3/s)] whose product with flows is the pressure times distance in a
+        direction (3,)."""
+        number = 2.0 * np.pi * hertz / SOUND_SPEED
+        pressures = np.linalg.solve(
+            self._system(number), self._waves(number, direction[None])[:, 0]
+        )
+        return np.asarray(-1j * AIR_DENSITY * SOUND_SPEED * number / (4.0 * np.pi) * pressures)
+
+    def _system(self, number: float) -> Any:
+        """Matrix (V, V) of the equation, of a wave number [1/m]."""
+        from bempp_cl.api.operators.boundary import helmholtz
+
+        system = self._half - self._matrix(helmholtz.double_layer, number)
+        return system + (1j / number) * self._matrix(helmholtz.hypersingular, number)
 
     def _matrix(self, operator: Any, *numbers: float) -> Any:
         space = self._space
@@ -139,11 +151,6 @@ def same_frequency(frequencies: Array) -> list[slice]:
             groups.append(slice(first, number))
             first = number
     return groups
-
-
-def _order(size: float) -> int:
-    """Order of the harmonics that a field of the size k R has."""
-    return int(np.ceil(size)) + ORDERS_BEYOND
 
 
 def _bempp() -> Any:

@@ -9,6 +9,9 @@ import numpy as np
 
 from carillon.arrays import Array, Complex
 
+ORDERS_BEYOND = 4
+"""Orders of harmonics beyond k R, the wave number times the radius of the solid."""
+
 
 @dataclass(frozen=True)
 class Directivity:
@@ -69,6 +72,11 @@ class Directivity:
     def towards(self, directions: Array) -> Complex:
         """Pressure times distance (T, K) in directions (T, 3), unit vectors in the solid's axes."""
         return np.asarray(harmonics(self.order, directions) @ self.coefficients.T)
+
+
+def order_of(size: float) -> int:
+    """Order of the harmonics that the field of a solid of the size k R has."""
+    return int(np.ceil(size)) + ORDERS_BEYOND
 
 
 def harmonics(order: int, directions: Array) -> Array:

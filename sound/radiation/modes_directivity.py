@@ -53,11 +53,10 @@ def modes_directivity(
     if not len(audible):
         return sphere()
     try:
-        mesh = boundary_mesh(shape.vertices, shape.faces, _triangles(shape, audible[-1]))
+        mesh, highest = resolved_mesh(shape, audible[-1])
     except UserError as error:
         say(f"{name!r} is heard as a sphere of its surface moves the air: {error}")
         return sphere()
-    highest = SOUND_SPEED / (FEWEST_EDGES_PER_WAVE * _edge(mesh))
     count = int(np.searchsorted(audible, highest))
     if count < len(audible):
         say(
@@ -78,6 +77,16 @@ def modes_directivity(
 
     solved = remembered("directivity", key.hexdigest(), found, _read, _write)
     return solved if count == len(frequencies) else solved.with_modes_after(sphere())
+
+
+def resolved_mesh(shape: Shape, highest: float) -> tuple[BoundaryMesh, float]:
+    """Triangles of even size for frequencies up to `highest` [Hz], and that up to which they are
+    fine enough.
+
+    Raises UserError if the surface is open, or encloses nothing.
+    """
+    mesh = boundary_mesh(shape.vertices, shape.faces, _triangles(shape, highest))
+    return mesh, SOUND_SPEED / (FEWEST_EDGES_PER_WAVE * _edge(mesh))
 
 
 def _triangles(shape: Shape, highest: float) -> int:

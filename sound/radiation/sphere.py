@@ -20,10 +20,11 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+from scipy.special import spherical_jn, spherical_yn
 
 from carillon.arrays import Array, Complex
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
-from sound.radiation.directivity import Directivity
+from sound.radiation.directivity import Directivity, even_directions, harmonics, order_of
 from sound.shape import Shape
 
 STEPS = 1 << 12
@@ -66,12 +67,13 @@ class Radiation:
 @dataclass(frozen=True)
 class _Panels:
     """Triangles that move: centres (F, 3) [m] from the solid's centre of mass, outward unit normals
-    (F, 3), flows (F, N) [m^2 kg^-1/2], the normal displacement in each mode times area, and the
-    radius [m] of the sphere with as large a surface.
+    (F, 3), areas (F,) [m^2], flows (F, N) [m^2 kg^-1/2], the normal displacement in each mode times
+    area, and the radius [m] of the sphere with as large a surface.
     """
 
     centres: Array
     normals: Array
+    areas: Array
     flows: Array
     radius: float
 
@@ -114,6 +116,69 @@ def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation
     return Radiation(pressure * np.where(inward, -monopole, monopole), pressure[:, None] * dipole)
 
 
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points (P, 3) [m] of a surface from the centre of mass, outward unit normals (P, 3), and the
+    areas (P,) [m^2] that they stand for."""
+
+    points: Array
+    outward: Array
+    areas: Array
+
+
+def surface_points(shape: Shape) -> SurfacePoints:
+    """The middles of a surface's triangles."""
+    panels = _panels(np.zeros((len(shape.vertices), 3, 0)), shape)
+    return SurfacePoints(panels.centres, panels.normals, panels.areas)
+
+
+def sphere_fields(surface: SurfacePoints, direction: Array, hertz: Array) -> Complex:
+    """Fields (F, P) [Pa m / (m/s)], whose products with the outward velocity of the points are the
+    pressure times distance in a direction (3,), at frequencies (F,) [Hz].
+
+    As `radiated` has it, with the phases of all orders, as a single direction needs them.
+    """
+    radius = float(np.sqrt(surface.areas.sum() / (4.0 * np.pi)))
+    numbers = 2.0 * np.pi * hertz[:, None] / SOUND_SPEED
+    values, slopes = _hankel(numbers[:, 0] * radius)
+    scatter = (-values / (numbers[:, 0] * slopes))[:, :, None]
+    away = np.linalg.norm(surface.points, axis=1).clip(AT_CENTRE * radius)
+    steep = (surface.points * surface.outward).sum(axis=1) / away
+    way, facing = surface.points @ direction, surface.outward @ direction
+    one, two = (spherical_jn(order, numbers * away) for order in (1, 2))
+    # dJ/dn, of order 0 and of order 1
+    plain = -numbers * one * steep
+    turned = -3j * (one / away * facing - numbers * two * steep * way / away)
+    field = np.exp(-1j * numbers * way) * (1.0 - 1j * numbers * scatter[2] * facing)
+    field = field + (scatter[0] - scatter[2]) * plain + (scatter[1] - scatter[2]) * turned
+    return np.asarray(AIR_DENSITY * SOUND_SPEED * numbers / (4.0 * np.pi) * field * surface.areas)
+
+
+def sphere_directivity(solid_motion: Array, shape: Shape, frequencies: Array) -> Directivity:
+    """Directivity of modes as `radiated` has them, but with the phases of all orders.
+
+    `radiated` describes the parameters.  A single direction is then nearer to the truth, by far:
+    `python -m tests.radiation_bem` compares both.
+    """
+    panels = _panels(solid_motion, shape)
+    numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
+    values, slopes = _hankel(numbers * panels.radius)
+    scatter = -values / (numbers * slopes)
+    low = _low_orders(panels, numbers)
+    order = order_of(float(numbers.max() * np.linalg.norm(shape.vertices, axis=1).max()))
+    directions, shares = even_directions(2 * order)
+    ways, facings = directions @ panels.centres.T, directions @ panels.normals.T
+    flows = np.ascontiguousarray(panels.flows)
+    cosine, sine, steep_cosine, steep_sine = _waves(ways, facings, numbers, flows)
+    heard = cosine - 1j * sine - numbers * scatter[2] * (1j * steep_cosine + steep_sine)
+    heard += (scatter[0] - scatter[2]) * low.plain_slope
+    heard += (scatter[1] - scatter[2]) * (directions @ low.turned_slope.T)
+    projected = (shares[:, None] * harmonics(order, directions)).T @ heard
+    pressure = AIR_DENSITY * SOUND_SPEED * numbers / (4.0 * np.pi)
+    # With exp(i omega t), and the velocity of a coordinate as the real part of its oscillator.
+    return Directivity(-pressure[:, None] * np.conj(projected.T))
+
+
 def _panels(motion: Array, shape: Shape) -> _Panels:
     """The triangles of a surface whose vertices move by (V, 3, N), none without area."""
     corners = shape.vertices[shape.faces]
@@ -126,13 +191,11 @@ def _panels(motion: Array, shape: Shape) -> _Panels:
     normals = np.where(((normals * outward).sum(axis=1) < 0.0)[:, None], -normals, normals)
     flows = np.einsum("fcin,fi,f->fn", motion[faces], normals, areas / 3.0, optimize=True)
     radius = float(np.sqrt(areas.sum() / (4.0 * np.pi)))
-    return _Panels(corners[there].mean(axis=1), normals, flows, radius)
+    return _Panels(corners[there].mean(axis=1), normals, areas, flows, radius)
 
 
 def _hankel(x: Array) -> tuple[Complex, Complex]:
     """Spherical Hankel functions (3, N) of the first kind, orders 0 to 2, and their derivatives."""
-    from scipy.special import spherical_jn, spherical_yn
-
     orders = np.arange(3)[:, None]
     values, slopes = (
         spherical_jn(orders, x, derivative) + 1j * spherical_yn(orders, x, derivative)
@@ -163,8 +226,6 @@ class _LowOrders:
 
 
 def _low_orders(panels: _Panels, numbers: Array) -> _LowOrders:
-    from scipy.special import spherical_jn
-
     away = np.linalg.norm(panels.centres, axis=1).clip(AT_CENTRE * panels.radius)[:, None]
     outward = panels.centres / away
     steep = (outward * panels.normals).sum(axis=1)[:, None]

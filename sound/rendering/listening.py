@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Complex
 from sound.clips.targets import Targets
 from sound.levels import faded
 from sound.project.design import Design
@@ -29,7 +29,8 @@ class Listening:
     noise of a residual is heard: partials that were missed belong to the clip, not to the material.
 
     `targets` are those of the clips, and `energies` (T,) those of the clips' modes: squared samples
-    summed over all time.
+    summed over all time.  `heard` (k,) [Pa m / (kg^-1/2 N s)] are the pressures of the modes where
+    the design sounds as its clips, None where it is struck; amplitudes are in Pa m then.
     """
 
     positions: Array
@@ -37,6 +38,7 @@ class Listening:
     noise_gains: Array
     targets: Targets
     energies: Array
+    heard: Complex | None = None
 
     @classmethod
     def of_design(cls, design: Design, solid: SoundingSolid) -> Listening:
@@ -48,7 +50,7 @@ class Listening:
         level = clip_level(targets, solid.frequencies, solid.dampings, amplitudes)
         squares = (targets.amplitudes**2 / (4.0 * targets.dampings)).sum(axis=1)
         energies = np.array(targets.rates) * squares
-        return cls(positions, level.gains, level.noise, targets, energies)
+        return cls(positions, level.gains, level.noise, targets, energies, solid.heard)
 
     @property
     def missed(self) -> Array:

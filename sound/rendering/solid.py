@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Complex
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.model import Solid
@@ -16,6 +16,7 @@ from solver.response.points import motion_at
 from solver.response.response import Damping
 from solver.subspace.weyl import clusters
 from sound.project.design import Design
+from sound.rendering.place import transfer_of
 
 
 @dataclass(frozen=True)
@@ -23,13 +24,16 @@ class SoundingSolid:
     """Elastic modes of a solid.
 
     `frequencies` f (k,) [Hz] and `dampings` d (k,) [1/s] are those of Eq. 3 of the appendix.  The
-    mass-normalised `modes` (n_dofs, k) [kg^-1/2] are given on the nodes of `model`.
+    mass-normalised `modes` (n_dofs, k) [kg^-1/2] are given on the nodes of `model`.  `heard` (k,)
+    [Pa m / (kg^-1/2 N s)] are their pressures where they are heard, None where they count as they
+    are struck.
     """
 
     frequencies: Array
     dampings: Array
     model: Solid
     modes: Array
+    heard: Complex | None = None
 
     @classmethod
     def of_design(cls, design: Design) -> SoundingSolid:
@@ -37,7 +41,8 @@ class SoundingSolid:
 
         Its dampings are those of the clips (§5) or of its material.
         """
-        return cls(design.frequencies, design.dampings, design.model, design.elastic_modes)
+        modes = design.elastic_modes
+        return cls(design.frequencies, design.dampings, design.model, modes, design.heard)
 
     @classmethod
     def of_modes(cls, file: ModesFile, damping: Damping | None = None) -> SoundingSolid:
@@ -85,34 +90,47 @@ class SoundingSolid:
             )
         _require_same_object(file.mesh, design.model.mesh)
         kept = slice(rigid, rigid + count)
-        return cls(file.frequencies[kept], design.dampings, file.model, file.modes[:, kept])
+        hertz, modes = file.frequencies[kept], file.modes[:, kept]
+        heard = None
+        if design.heard is not None:
+            heard = transfer_of(design).heard(file.model, modes, hertz)
+        return cls(hertz, design.dampings, file.model, modes, heard)
 
     def motion(self, positions: Array) -> Array:
         """Displacement (p, 3, k) [kg^-1/2] of points (p, 3) [m] of the surface in each mode."""
         return motion_at(self.model, self.modes, positions)
 
     def amplitudes(self, positions: Array, impulses: Array) -> Array:
-        """Amplitudes a_k (p, k) [kg^-1/2 N s] after impulses (p, 3) [N s] at points (p, 3) [m].
+        """Amplitudes a_k (p, k) after impulses (p, 3) [N s] at points (p, 3) [m].
 
-        See `struck_amplitudes`.
+        They are in kg^-1/2 N s, or in Pa m where they are `heard`, see `struck_amplitudes`.
         """
         pushed = np.einsum("pik,pi->pk", self.motion(positions), impulses)
-        return struck_amplitudes(pushed, self.frequencies)
+        return struck_amplitudes(pushed, self.frequencies, self.heard)
 
 
-def struck_amplitudes(pushed: Array, frequencies: Array) -> Array:
+def struck_amplitudes(pushed: Array, frequencies: Array, heard: Complex | None = None) -> Array:
     """Amplitudes a_k (p, k) of modes that impulses f push by u_k^T f (p, k) [kg^-1/2 N s].
 
     a_k = |u_k^T f|: every mode starts in the direction of the push, so its sign does not matter.
     Within a cluster of equal frequencies (k,) [Hz], which ascend, it is (u_k^T f)^2 over the root
     of the sum of these squares: the whole cluster then is as loud as |U^T f|, whatever the basis of
     its modes.
+
+    Modes that are `heard` by pressures h (k,) have a_k = |u_k^T f h_k|, and a cluster, whose
+    pressures add up, |sum u_i^T f h_i|, of which modes have shares as these squares.
     """
     groups = clusters(frequencies**2)
-    square = pushed**2
-    joint = np.sqrt(np.add.reduceat(square, [group.start for group in groups], axis=1))
-    joint = np.repeat(joint, [group.stop - group.start for group in groups], axis=1)
-    return np.asarray(np.divide(square, joint, out=np.zeros_like(square), where=joint > 0.0))
+    firsts = [group.start for group in groups]
+    square = pushed**2 if heard is None else np.abs(pushed * heard) ** 2
+    whole = np.add.reduceat(square, firsts, axis=1)
+    if heard is None:
+        divisor = np.sqrt(whole)
+    else:
+        joint = np.abs(np.add.reduceat(pushed * heard, firsts, axis=1))
+        divisor = np.divide(whole, joint, out=np.zeros_like(whole), where=joint > 0.0)
+    divisor = np.repeat(divisor, [group.stop - group.start for group in groups], axis=1)
+    return np.asarray(np.divide(square, divisor, out=np.zeros_like(square), where=divisor > 0.0))
 
 
 def _require_same_object(mesh: HexMesh, designed: HexMesh) -> None:

@@ -83,6 +83,14 @@ class Body:
         return None if self.sounding is None else self.sounding.listening
 
     @property
+    def is_as_clips(self) -> bool:
+        """Whether its modes are as loud as a design's clips say, in all directions.
+
+        Those of a design for a place move the air, and so are that loud at that place alone.
+        """
+        return self.listening is not None and self.listening.heard is None
+
+    @property
     def accuracy(self) -> dict[str, Any] | None:
         """Expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`, if known."""
         return None if self.sounding is None else self.sounding.accuracy
@@ -106,7 +114,7 @@ class Body:
 
         The unit is that of `sound.rendering.listening.Listening.gain`.
         """
-        if self.listening is None:
+        if self.listening is None or not self.is_as_clips:
             return np.ones((len(places), 1))
         return np.array([[self.listening.gain(place)] for place in self.in_solid(places)])
 

@@ -41,7 +41,7 @@ class Sounding:
     Attributes
     ----------
     solid, listening
-        Modes; loudness and noise of a design's clips, None without.
+        Modes as they are struck; loudness and noise of a design's clips, None without.
     accuracy
         Expected errors of the frequencies, see `sound.scenes.solved.SolvedSolid`; None if they are
         unknown.
@@ -138,7 +138,7 @@ def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
         touched.materials,
         touched.which,
         _volume(design.model),
-        lambda: Sounding(sounding, Listening.of_design(design, sounding)),
+        lambda: Sounding(replace(sounding, heard=None), Listening.of_design(design, sounding)),
         design.remaining_turn(entry.up),
         is_held=design.model.rigid_modes < RIGID_MODES,
     )

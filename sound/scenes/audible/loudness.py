@@ -22,7 +22,7 @@ from carillon.arrays import Array
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.directivity import Directivity
 from sound.radiation.modes_directivity import modes_directivity
-from sound.radiation.sphere import radiated
+from sound.radiation.sphere import radiated, sphere_directivity
 from sound.scenes.audible.excitation import mean_places
 from sound.scenes.bodies import Body
 from sound.scenes.contact.impacts import HertzImpact
@@ -40,19 +40,27 @@ def mode_directivity(body: Body, radiation: RadiationMethod) -> Directivity:
 
     Each mode of a body without clips is as loud as its surface moves the air.  The modes of a
     design are as loud beside each other as its clips say, alike in all directions; together they
-    are as loud as their surface moves the air, on average over the targets' points.  Without
-    `radiation` all are 1.  Raises UserError if boundary elements are not installed.
+    are as loud as their surface moves the air, on average over the targets' points.  Those of a
+    design for a place move the air with all phases, as the place was chosen by.  Without
+    `radiation` all are 1, or what they are at that place.  Raises UserError if boundary elements
+    are not installed.
     """
     assert body.solid is not None
     frequencies, shape = body.solid.frequencies, body.shape
-    alike = Directivity.uniform(np.ones(len(frequencies)))
+    listening = body.listening
+    of_place = None if listening is None else listening.heard
     if not radiation:
-        return alike
+        alone = np.ones(len(frequencies)) if of_place is None else np.abs(of_place)
+        return Directivity.uniform(alone)
     if radiation == "boundary-elements":
         air = modes_directivity(body.entry.name, shape, body.motion, frequencies)
+    elif of_place is not None:
+        air = sphere_directivity(body.motion(shape.vertices), shape, frequencies)
     else:
         air = radiated(body.motion(shape.vertices), shape, frequencies).directivity
-    return air if body.listening is None else alike.times(_clip_factor(body, air))
+    if not body.is_as_clips:
+        return air
+    return Directivity.uniform(np.full(len(frequencies), _clip_factor(body, air)))
 
 
 def voice(body: Body, directivity: Directivity) -> Voice:
@@ -115,6 +123,15 @@ def clip_noise(
         if struck.any() and len(noise):
             total += gain * fftconvolve(struck, noise)[:count]
     return total
+
+
+def noise_gain(body: Body, directivity: Directivity) -> float:
+    """Gain [Pa m] of the noise of a design's clips, from the directivity of its modes."""
+    assert body.listening is not None
+    if body.is_as_clips:
+        return float(directivity.coefficients[0, 0].real)
+    # At the place where the modes are heard as its clips are.
+    return float(10.0 ** (body.entry.level / 20.0) / body.listening.gains.mean())
 
 
 def _clip_factor(body: Body, air: Directivity) -> float:

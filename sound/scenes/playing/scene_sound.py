@@ -12,7 +12,7 @@ from sound.radiation.directivity import Directivity
 from sound.scenes.audible.contact_damping import rests_of
 from sound.scenes.audible.excitation import excitation
 from sound.scenes.audible.hearing import Head, along, heard, towards
-from sound.scenes.audible.loudness import click, clip_noise, mode_directivity
+from sound.scenes.audible.loudness import click, clip_noise, mode_directivity, noise_gain
 from sound.scenes.audible.measured_hearing import heard_measured
 from sound.scenes.audible.sustained_contact import SustainedForce, sustained_force
 from sound.scenes.bodies import Body
@@ -88,7 +88,7 @@ class SceneSound:
         gains = directivity.towards(directions)
         total += self._modes(number, body, impacts, Gains(frames, gains))
         if body.listening is not None and settings.noise:
-            gain = float(gains[0, 0].real)
+            gain = noise_gain(body, directivity)
             total += clip_noise(number, body, impacts, gain, count, rate)
         return total
 
@@ -110,7 +110,7 @@ class SceneSound:
             rests,
             self.count,
             settings.rate,
-            signed=bool(settings.radiation) and body.listening is None,
+            signed=bool(settings.radiation) and not body.is_as_clips,
             damped=settings.contact_damping,
         )
         frequencies, dampings = body.solid.frequencies, body.solid.dampings
