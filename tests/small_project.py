@@ -59,6 +59,11 @@ def smooth_fields(grid):
     return fields / np.sqrt((fields**2).mean(axis=0))
 
 
+def other_moduli(grid, seed=0):
+    """Moduli (m,) of another material."""
+    return np.exp(0.3 * smooth_fields(grid) @ np.random.default_rng(seed).normal(size=9))
+
+
 def targets(made, seed=0, names=("end", "side")):
     """What the bar sounds like with another material.
 
@@ -75,9 +80,7 @@ def targets(made, seed=0, names=("end", "side")):
         (RATE,) * 2,
     )
     setting = prepare(made, empty).setting
-    moduli = np.exp(
-        0.3 * smooth_fields(setting.mesh.grid) @ np.random.default_rng(seed).normal(size=9)
-    )
+    moduli = other_moduli(setting.mesh.grid, seed)
     evaluation = setting.simulation().evaluate(setting.material.coordinates(moduli))
     frequencies = np.sqrt(evaluation.eigenvalues) / (2.0 * np.pi)
     chosen = [("end", "side").index(name) for name in names]

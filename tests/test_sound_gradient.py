@@ -36,11 +36,11 @@ def strikes(shape):
     ]
 
 
-def simulation(shape, coarsen, law, free=NOTHING):
+def simulation(shape, coarsen, law, free=NOTHING, heard=None):
     mesh = block_mesh(shape)
     material = ReducedMaterial.of_mesh(mesh, SIZE, 1e9, law, free)
     options = ProblemOptions("block", 8, coarsen=coarsen)
-    return Simulation(mesh, options, material, strikes(shape), MODES, tolerance=1e-13)
+    return Simulation(mesh, options, material, strikes(shape), MODES, 1e-13, heard=heard)
 
 
 def free_poisson(low, high):

@@ -60,6 +60,7 @@ def summarise(design: Design) -> dict[str, Any]:
         "young_max_pa": float(design.young.max()),
         "density_kg_per_m3": design.model.density,
         "poisson": design.model.poisson,
+        "listen": None if design.heard is None else design.settings["listen"],
         "damping_source": design.settings.get("damping", {}).get("source"),
         "damping_ratios": ratios.tolist(),
         "regions": _regions(design),
@@ -69,6 +70,14 @@ def summarise(design: Design) -> dict[str, Any]:
         "verdict": evidence.get("verdict"),
         "build": evidence.get("build"),
     }
+
+
+def _place_sentence(listen: dict[str, Any] | None) -> list[str]:
+    if listen is None:
+        return []
+    way = "as a sphere" if listen["radiation"] == "sphere" else f"by {listen['radiation']}"
+    at = ", ".join(f"{each:g}" for each in listen["at"])
+    return [f"amplitudes are those heard at ({at}), where its surface moves the air {way}"]
 
 
 def _regions(design: Design) -> list[dict[str, Any]]:
@@ -111,6 +120,7 @@ def sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             *_left_out_sentence(summary),
             _rms_sentence(summary),
             *_material_sentences(design, summary),
+            *_place_sentence(summary["listen"]),
             _damping_sentence(summary),
             *_build_sentences(summary["build"]),
             *([summary["verdict"]["sentence"]] if summary["verdict"] else []),

@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from carillon.arrays import Array, Complex
-from carillon.command_line.counts import counted
-from carillon.command_line.progress import say, track
+from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.files.cache import remembered
-from carillon.files.datasets import read
-from carillon.files.hdf5 import create_h5, open_h5
 from sound.radiation.air import SOUND_SPEED
-from sound.radiation.boundary_elements import BoundaryElements
 from sound.radiation.boundary_mesh import BoundaryMesh
 from sound.radiation.modes_directivity import resolved_mesh
+from sound.radiation.plane_waves import SolvedWaves
 from sound.radiation.sphere import SurfacePoints, sphere_fields, surface_points
 from sound.radiation.transfer import Transfer
 from sound.shape import Shape
 
 NEAREST = 2.0
 """Least distance of a place from the centre of mass, over that of the solid's farthest point."""
-BEYOND = 1.5
+BEYOND = 1.15
 """Factor by which the band of a transfer goes beyond frequencies to either side."""
-STEP = 0.05
-"""Greatest distance of frequencies where a transfer is found, over the frequency."""
-TURN = 0.8
-"""Greatest change of phase [rad] between them, of a wave over the radius of the solid."""
-_KIND, _SCHEMA = "fields", 1
-_VERSION = 1  # counted up when other fields are found than before
-"""Kind and schema of entries in the cache."""
+STEP, TURN = 0.05, 0.8
+"""Greatest distance of a transfer's frequencies, over the frequency, and greatest change of phase
+[rad] between them, of a wave over the radius of the solid."""
+FIRST_STEP, FIRST_TURN = 0.2, 2.4
+"""The same of frequencies where boundary elements are solved first; between these where needed."""
 
 
 @dataclass(frozen=True)
@@ -64,36 +56,41 @@ def transfer_to(
             f"as far as the solid reaches ({NEAREST * radius:.3g} m) or more: sound is computed as "
             "it is heard from far away"
         )
-    direction, band = away / distance, frequencies_between(*hertz, radius)
+    direction, band = away / distance, frequencies_between(*hertz, radius, STEP, TURN)
     if not place.by_elements:
         surface = surface_points(shape)
         fields = sphere_fields(surface, direction, band)
     else:
-        surface, fields = _by_elements(shape, direction, band, name)
+        first = frequencies_between(*hertz, radius, FIRST_STEP, FIRST_TURN)
+        surface, fields = _by_elements(shape, direction, band, first, name)
     return Transfer.of_fields(surface.points + centre, surface.outward, band, fields)
 
 
-def frequencies_between(lowest: float, highest: float, radius: float) -> Array:
-    """Ascending frequencies (F,) [Hz] from which a transfer follows between two and `BEYOND`.
+def frequencies_between(
+    lowest: float, highest: float, radius: float, step: float, turn: float
+) -> Array:
+    """Ascending frequencies (F,) [Hz] between two and, by `BEYOND`, on either side of them.
 
-    Steps are `STEP` of the frequency, but let no wave turn by more than `TURN` over a radius [m].
+    Their distance is a `step` of the frequency, but lets no wave turn by more than `turn` [rad]
+    over a radius [m].
 
     Examples
     --------
-    >>> frequencies_between(300.0, 3000.0, 0.1).round(1)[[0, 1, -1]].tolist()
-    [200.0, 210.0, 4500.0]
+    >>> frequencies_between(230.0, 3000.0, 0.1, 0.05, 0.8).round(1)[[0, 1, -1]].tolist()
+    [200.0, 210.0, 3450.0]
     """
     last = BEYOND * highest
-    steps, widest = [lowest / BEYOND], TURN * SOUND_SPEED / (2.0 * np.pi * radius)
+    steps, widest = [lowest / BEYOND], turn * SOUND_SPEED / (2.0 * np.pi * radius)
     while steps[-1] < last:
-        steps.append(steps[-1] + min(STEP * steps[-1], widest))
+        steps.append(steps[-1] + min(step * steps[-1], widest))
     return np.array([*steps[:-1], last])
 
 
 def _by_elements(
-    shape: Shape, direction: Array, hertz: Array, name: str
+    shape: Shape, direction: Array, hertz: Array, first: Array, name: str
 ) -> tuple[SurfacePoints, Complex]:
-    """Fields (F, P) by boundary elements; that of a sphere where these are too coarse."""
+    """Fields (F, P) at frequencies [Hz] by boundary elements, solved at the `first` ones and
+    between; those of a sphere where they are too coarse."""
     mesh, highest = resolved_mesh(shape, float(hertz[-1]))
     surface = _middles_of_edges(mesh)
     count = int(np.searchsorted(hertz, highest))
@@ -102,22 +99,15 @@ def _by_elements(
             f"{name}: above {highest:,.0f} Hz a sphere of its surface moves the air in place of "
             "boundary elements"
         )
-    low = hertz[:count]
-    key = hashlib.sha256(repr(_VERSION).encode())
-    for values in (mesh.vertices, mesh.faces.astype(float), direction, low):
-        key.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
-
-    def found() -> Complex:
-        elements = BoundaryElements(mesh)
-        label = f"radiation of {name}, {counted(len(mesh.faces), 'triangle')}"
-        each = track(low, label, unit="frequencies")
-        return np.array([elements.field(float(frequency), direction) for frequency in each])
-
-    at_vertices = remembered("fields", key.hexdigest(), found, _read, _write)
+    if not count:
+        return surface, sphere_fields(surface, direction, hertz)
+    last = hertz[count - 1]
+    waves = SolvedWaves.of(mesh, direction, np.append(first[first < last], last), name)
+    at_vertices = waves.at(hertz[:count])
     following = np.roll(mesh.faces, -1, axis=1)
     middles = 0.5 * (at_vertices[:, mesh.faces] + at_vertices[:, following])
-    solved = middles.reshape(len(low), -1) * surface.areas
-    return surface, np.concatenate([solved, sphere_fields(surface, direction, hertz[count:])])
+    low = middles.reshape(count, len(surface.points)) * surface.areas
+    return surface, np.concatenate([low, sphere_fields(surface, direction, hertz[count:])])
 
 
 def _middles_of_edges(mesh: BoundaryMesh) -> SurfacePoints:
@@ -128,14 +118,3 @@ def _middles_of_edges(mesh: BoundaryMesh) -> SurfacePoints:
     return SurfacePoints(
         middles.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.repeat(areas / 3.0, 3)
     )
-
-
-def _read(path: Path) -> Complex:
-    with open_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        real, imaginary = (read(file, part, (None, None)) for part in ("real", "imaginary"))
-        return np.asarray(real + 1j * imaginary)
-
-
-def _write(path: Path, fields: Complex) -> None:
-    with create_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        file["real"], file["imaginary"] = fields.real, fields.imag

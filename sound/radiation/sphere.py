@@ -151,7 +151,8 @@ def sphere_fields(surface: SurfacePoints, direction: Array, hertz: Array) -> Com
     turned = -3j * (one / away * facing - numbers * two * steep * way / away)
     field = np.exp(-1j * numbers * way) * (1.0 - 1j * numbers * scatter[2] * facing)
     field = field + (scatter[0] - scatter[2]) * plain + (scatter[1] - scatter[2]) * turned
-    return np.asarray(AIR_DENSITY * SOUND_SPEED * numbers / (4.0 * np.pi) * field * surface.areas)
+    pressure = AIR_DENSITY * SOUND_SPEED * numbers / (4.0 * np.pi)
+    return np.asarray(-1j * pressure * field * surface.areas)
 
 
 def sphere_directivity(solid_motion: Array, shape: Shape, frequencies: Array) -> Directivity:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from carillon.arrays import Array
+from carillon.arrays import Array, Complex
 from sound.clips.targets import Targets
 from sound.design.pitch import bark, cents, partials_alone, rms_off_partials
 from sound.rendering.clip_level import clip_level
@@ -24,13 +24,15 @@ class Heard:
     the clips'.
 
     Unit impulses inwards at the surface's vertices push them by `pushed` (V, N) [kg^-1/2]; the
-    modulus there is `young` (V,) [Pa].
+    modulus there is `young` (V,) [Pa].  At the place of the targets their pressures are `at_place`
+    (N,) [Pa m / (kg^-1/2 N s)], None without one.
     """
 
     hertz: Array
     dampings: Array | None
     pushed: Array
     young: Array
+    at_place: Complex | None = None
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ def bank(heard: Heard, positions: Array, aim: Aim | None, header: dict[str, Any]
     order = np.argsort(heard.hertz, kind="stable")
     hertz, pushed = heard.hertz[order], heard.pushed[:, order]
     dampings = None if heard.dampings is None else heard.dampings[order]
-    gains = struck_amplitudes(pushed, hertz)
+    at_place = None if heard.at_place is None else heard.at_place[order]
+    gains = struck_amplitudes(pushed, hertz, at_place)
     errors: dict[str, Any] = {"targets": [], "wanted_hertz": None, "cents": None, "bark": None}
     errors |= {"rms_cents": None, "left_out_hz": []}
     struck = np.empty((0, len(hertz)))

@@ -185,6 +185,7 @@ class SolidProcess:
             made.dampings,
             sounding.pushed(made.model, made.elastic_modes, self._inward),
             self._at_vertices(made.young),
+            made.heard,
         )
         told = {
             "cost": made.evidence.get("cost"),
@@ -204,6 +205,9 @@ class SolidProcess:
             return False
         own, targets = self._problem.project.as_dict(), self._problem.setting.objective.targets
         if any((design.settings.get(kind) or []) != own[kind] for kind in KINDS):
+            return False
+        is_of_place = design.heard is not None or own["listen"]["at"] is not None
+        if is_of_place and design.settings.get("listen") != own["listen"]:
             return False
         return design.targets.names == targets.names and np.array_equal(
             design.targets.frequencies, targets.frequencies
@@ -230,18 +234,20 @@ class SolidProcess:
         own = frequencies(evaluation.eigenvalues) if hertz is None else np.asarray(hertz)
         elastic = sounding.elastic(evaluation)
         aim, young, keys = self._aimed(), material.moduli(at), dict(header)
-        dampings = None
+        dampings, transfer = None, None
         if aim is None:
             dampings = Damping().decay_per_second(evaluation.eigenvalues)
         else:
             assert self._problem is not None
             objective = self._problem.setting.objective
+            transfer = objective.heard
             if not objective.absolute:
                 factor = stretch_to(np.sort(own), aim.targets)
                 own, young = factor * own, factor**2 * young
             keys.setdefault("cost", cost_of(objective, material, evaluation).total)
         pushed = sounding.pushed(sounding.model, elastic, self._inward)
-        heard = Heard(own, dampings, pushed, self._at_vertices(young))
+        at_place = None if transfer is None else transfer.heard(sounding.model, elastic, own)
+        heard = Heard(own, dampings, pushed, self._at_vertices(young), at_place)
         told = {"cost": None, "checked": False, "rigid_motions": sounding.model.rigid_modes}
         return bank(heard, self._positions, aim, {**told, **keys})
 
