@@ -155,7 +155,9 @@ def test_more_frequencies_are_solved_where_the_air_resonates():
 
 def test_a_near_place_is_refused():
     shape = box_shape((0.2, 0.1, 0.06))
-    with pytest.raises(UserError, match="listen.at: lies 0.2 m from the centre of mass, expected"):
+    with pytest.raises(
+        UserError, match="listen.at: lies 0.2 m from the middle of the solid, expected"
+    ):
         transfer_to(Place(0.2 * DIRECTION), shape, np.zeros(3), (300.0, 4000.0), "box")
 
 

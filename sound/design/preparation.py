@@ -36,7 +36,7 @@ from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
-from sound.radiation.place import transfer_to
+from sound.radiation.place import require_far, transfer_to
 from sound.radiation.transfer import Transfer
 from sound.shape import Shape
 from sound.strikes import Strike
@@ -178,6 +178,9 @@ def prepare(
     surface = project.surface() if solid is None else solid.surface
     if targets is None:
         strikes = usable_strikes(project, surface)
+        place = project.listen.place(project.unit)
+        if place is not None:
+            require_far(place, np.asarray(surface.vertices))
         sought = targets_of(project)
     else:
         strikes, sought = project.strikes(surface), targets

@@ -18,7 +18,7 @@ from sound.radiation.transfer import Transfer
 from sound.shape import Shape
 
 NEAREST = 2.0
-"""Least distance of a place from the centre of mass, over that of the solid's farthest point."""
+"""Least distance of a place from the middle of a solid, over that of its farthest point."""
 BEYOND = 1.15
 """Factor by which the band of a transfer goes beyond frequencies to either side."""
 STEP, TURN = 0.05, 0.8
@@ -47,16 +47,11 @@ def transfer_to(
     near, and if boundary elements are not installed or the surface, which has a `name` in messages,
     is open.
     """
+    require_far(place, shape.vertices + centre)
     away = place.at - centre
-    distance = float(np.linalg.norm(away))
+    direction = away / np.linalg.norm(away)
     radius = float(np.linalg.norm(shape.vertices, axis=1).max())
-    if distance < NEAREST * radius:
-        raise UserError(
-            f"listen.at: lies {distance:.3g} m from the centre of mass, expected {NEAREST:g} times "
-            f"as far as the solid reaches ({NEAREST * radius:.3g} m) or more: sound is computed as "
-            "it is heard from far away"
-        )
-    direction, band = away / distance, frequencies_between(*hertz, radius, STEP, TURN)
+    band = frequencies_between(*hertz, radius, STEP, TURN)
     if not place.by_elements:
         surface = surface_points(shape)
         fields = sphere_fields(surface, direction, band)
@@ -64,6 +59,19 @@ def transfer_to(
         first = frequencies_between(*hertz, radius, FIRST_STEP, FIRST_TURN)
         surface, fields = _by_elements(shape, direction, band, first, name)
     return Transfer.of_fields(surface.points + centre, surface.outward, band, fields)
+
+
+def require_far(place: Place, vertices: Array) -> None:
+    """Raise UserError if a place is near to a surface of vertices (V, 3) [m]."""
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    distance = float(np.linalg.norm(place.at - middle))
+    least = NEAREST * float(np.linalg.norm(vertices - middle, axis=1).max())
+    if distance < least:
+        raise UserError(
+            f"listen.at: lies {distance:.3g} m from the middle of the solid, expected at least "
+            f"{least:.3g} m, {NEAREST:g} times as far as the solid reaches, since sound is computed "
+            "as it is heard from far away; name a place in the same direction"
+        )
 
 
 def frequencies_between(
