@@ -69,8 +69,8 @@ def require_far(place: Place, vertices: Array) -> None:
     if distance < least:
         raise UserError(
             f"listen.at: lies {distance:.3g} m from the middle of the solid, expected at least "
-            f"{least:.3g} m, {NEAREST:g} times as far as the solid reaches, since sound is computed "
-            "as it is heard from far away; name a place in the same direction"
+            f"{least:.3g} m, {NEAREST:g} times as far as the solid reaches, since sound is "
+            "computed as it is heard from far away; name a place in the same direction"
         )
 
 
