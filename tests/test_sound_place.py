@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 from carillon.errors import UserError
 from carillon.fem.model import mass_properties
 from solver.files.modes_file import ModesFile, frequencies
+from solver.response.vertices import inward_normals
 from sound.design.objective import Objective
 from sound.design.optimise import optimise
 from sound.design.preparation import prepare
@@ -34,6 +35,8 @@ from sound.scenes.audible.loudness import mode_directivity
 from sound.scenes.bodies import bodies_of, with_modes
 from sound.scenes.object_entry import ObjectEntry
 from sound.shape import Shape
+from studio.binary import unpack
+from studio.processes.bank import Aim, Heard, bank
 from tests import small_project
 from tests.radiation_bem import CHECKED, RADIUS, sphere, sphere_pressure
 from tests.small_design import small_design
@@ -308,3 +311,24 @@ def test_in_scenes_a_design_sounds_as_designed_at_its_place_alone(found, tmp_pat
     assert there == pytest.approx(np.abs(found.heard), rel=0.05, abs=0.02 * loudest)
     assert np.abs(20.0 * np.log10(elsewhere / there)).max() > 1.0
     assert mode_directivity(body, False).rms == pytest.approx(np.abs(found.heard))
+
+
+# The studio ---------------------------------------------------------------------------------------
+
+
+def test_the_studio_plays_what_is_heard_at_the_place(found):
+    solid = SoundingSolid.of_design(found)
+    listening = Listening.of_design(found, solid)
+    vertices = np.array([strike.vertex for strike in found.strikes])
+    positions = found.surface_vertices
+    inward = inward_normals(
+        trimesh.Trimesh(positions, found.surface_faces, process=False), positions
+    )
+    pushed = np.einsum("pik,pi->pk", solid.motion(positions), inward)
+    heard = Heard(
+        found.frequencies, found.dampings, pushed, np.ones(len(positions)), at_place=found.heard
+    )
+    _, arrays = unpack(bank(heard, positions, Aim(found.targets, vertices), {}))
+    expected = solid.amplitudes(positions[vertices], inward[vertices])
+    expected *= np.array([listening.gain(positions[vertex]) for vertex in vertices])[:, None]
+    assert arrays["struck"] == pytest.approx(expected, rel=1e-6)
