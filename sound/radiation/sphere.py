@@ -97,7 +97,7 @@ def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation
     (E. G. Williams, Fourier Acoustics, 1999, chapter 6).
 
     Averaged over directions, the level of the first eight elastic modes is 0.9 dB (rms) off that by
-    the boundary element method for a steel bar, 0.8 dB for a stoneware plate, 5.6 dB for a brass
+    the boundary element method for a steel bar, 1.4 dB for a stoneware plate, 5.6 dB for a brass
     bowl and 6.6 dB for a wine glass, which amplify some modes by resonance of the air in them: the
     worst is 12 dB too soft (`python -m tests.radiation_bem bar plate bowl wine-glass`).
     """
