@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import command_help
+import places
 import pytest
 
 from carillon import ROOMS
@@ -96,6 +97,13 @@ def test_make_targets_exist():
     assert {"run", "test", "env", "check", "docs"} <= named <= targets
 
 
+@EACH
+def test_parts_that_are_made_are_named_with_where_they_will_be(page):
+    for _, place in places.PLACE.findall(page.read_text()):
+        html = page.relative_to(DOCS).with_suffix(".html")
+        assert place == f"build/docs/{html}"
+
+
 def test_the_readme_is_short():
     assert len((CHECKOUT / "README.md").read_text().splitlines()) <= 180
 
@@ -105,7 +113,8 @@ def test_every_command_has_its_help_on_a_page():
         (DOCS / "reference" / "commands" / f"{page}.md").read_text()
         for page in ("index", *ROOMS[1:])
     )
-    rooms = re.findall(r"^<!-- made here: commands (\w+) -->$", text, re.MULTILINE)
+    made = [name.split() for name, _ in places.PLACE.findall(text)]
+    rooms = [words[1] for words in made if words[0] == "commands"]
     headings = re.findall(
         r"^## `carillon ([^`]+)`$", "\n".join(map(command_help.of_room, rooms)), re.M
     )

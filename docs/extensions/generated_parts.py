@@ -1,4 +1,4 @@
-"""Parts of pages that are made from the sources: `<!-- made here: NAME WORDS -->` is replaced."""
+"""Parts of pages that are made from the sources, in place of a line that says so, see `places`."""
 
 import re
 from collections.abc import Callable
@@ -8,6 +8,7 @@ import command_help
 import gallery
 import rooms_picture
 import schema_keys
+from places import PLACE
 from sphinx.application import Sphinx
 
 PARTS: dict[str, Callable[..., str]] = {
@@ -21,7 +22,6 @@ PARTS: dict[str, Callable[..., str]] = {
     "examples": gallery.of_examples,
     "materials": schema_keys.of_materials,
 }
-_PLACE = re.compile(r"^<!-- made here: (.+) -->$", re.MULTILINE)
 
 
 def fill(app: Sphinx, page: str, source: list[str]) -> None:
@@ -31,7 +31,7 @@ def fill(app: Sphinx, page: str, source: list[str]) -> None:
         name, *words = place[1].split()
         return PARTS[name](*words)
 
-    source[0] = _PLACE.sub(part, source[0])
+    source[0] = PLACE.sub(part, source[0])
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
