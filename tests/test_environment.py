@@ -86,8 +86,11 @@ def test_an_error_on_one_rank_ends_all_of_them(mpiexec, tmp_path):
     assert "rank 1 cannot go on" in done.stderr
 
 
+ENVS = CHECKOUT / "workflow" / "envs"
+
+
 def locked(name: str) -> dict[str, str]:
-    lines = (CHECKOUT / "workflow" / "envs" / name).read_text().splitlines()
+    lines = (ENVS / name).read_text().splitlines()
     pins = (line.split("==") for line in lines if line and not line.startswith("#"))
     return {package.lower().replace("_", "-"): version for package, version in pins}
 
@@ -110,6 +113,60 @@ def test_the_installed_numpy_is_the_locked_one():
         locked("lock.txt")["numpy"],
         locked("lock-numpy2.txt")["numpy"],
     }
+
+
+def built() -> dict[str, str]:
+    """Versions of what PETSC=source builds."""
+    lines = (ENVS / "petsc-source.txt").read_text().splitlines()
+    return dict(line.split("==") for line in lines if line and not line.startswith("#"))
+
+
+def installed_requirements() -> set[str]:
+    """Requirement files that `make env` installs."""
+    parts = re.search(r"for part in ([a-z ]+); do", (ENVS / "setup.sh").read_text())
+    return {"requirements.txt", *(f"requirements-{part}.txt" for part in parts[1].split())}
+
+
+def test_the_conda_environment_is_the_locked_one():
+    described = yaml.safe_load((ENVS / "environment.yml").read_text())
+    pinned, pip = {}, []
+    for entry in described["dependencies"]:
+        if isinstance(entry, dict):
+            pip = entry["pip"]
+        elif "=" in entry:
+            name, version, *_ = entry.split("=")
+            pinned[name] = version
+    assert pinned.pop("python") == "3.12"
+    known = {**locked("lock-numpy2.txt"), **built()}
+    assert pinned == {name: known[name] for name in pinned}
+    assert {"mpi4py", "petsc4py", "slepc4py", "numpy"} <= set(pinned)
+    assert pip[0] == "-c lock-numpy2.txt"
+    assert {entry.removeprefix("-r ") for entry in pip[1:]} == installed_requirements()
+
+
+def test_the_spack_environment_is_the_locked_one():
+    text = (ENVS / "spack.yaml").read_text()
+    specs = yaml.safe_load(text)["spack"]["specs"]
+    versions = dict(spec.split()[0].split("@") for spec in specs if "@" in spec)
+    assert versions.pop("python") == "3.12"
+    known = {**locked("lock-numpy2.txt"), **built()}
+    pinned = {name.removeprefix("py-"): version for name, version in versions.items()}
+    assert pinned == {name: known[name] for name in pinned}
+    needed = installed_requirements() - {"requirements-dev.txt"}
+    assert set(re.findall(r"-r (\S+)", text)) == needed
+
+
+def test_images_are_made_by_one_script_and_have_one_environment():
+    container = (ENVS / "Containerfile").read_text()
+    apptainer = (CHECKOUT / "slurm" / "carillon.def").read_text()
+    bare = (CHECKOUT / ".ci" / "bare-root").read_text()
+    assert all("workflow/envs/image.sh" in text for text in (container, apptainer, bare))
+    assert "debian:12" in container and "From: debian:12" in apptainer
+    for setting in (
+        "PATH=/opt/carillon/.venv/bin:$PATH",
+        "OMPI_MCA_btl_vader_single_copy_mechanism",
+    ):
+        assert setting in container and setting in apptainer
 
 
 def test_the_licence_is_bsd_3_clause():
