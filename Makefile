@@ -35,7 +35,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # They run beside each other, so that more threads would only wait for each other.
 test: export OMP_NUM_THREADS ?= 1
 
-.PHONY: help env run test test-all check docs clean
+.PHONY: help env run test test-all check docs release clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -75,6 +75,9 @@ docs: env  ## the documentation; ends at build/docs/index.html
 	@bash workflow/envs/docs.sh build/docs-venv
 	@build/docs-venv/bin/python -m sphinx -q -E -W --keep-going -d build/doctrees docs build/docs
 	@echo "documentation: $(abspath build/docs/index.html)"
+
+release: docs  ## sdist, wheel, documentation, reference tables, checksums; end in build/release
+	@.ci/release
 
 clean:  ## remove the environment, caches and built files; results/ stays
 	@rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache *.egg-info
