@@ -107,7 +107,8 @@ def approximation(vibrating: VibratingSurface) -> Directivity:
 def all_phases(vibrating: VibratingSurface) -> Directivity:
     """Directivity of that sphere with the phases of all orders."""
     shape = Shape.of_surface(vibrating.mesh.vertices, vibrating.mesh.faces, np.zeros(3))
-    return sphere_directivity(vibrating.motion, shape, vibrating.frequencies)
+    moved = vibrating.motion[shape.faces].mean(axis=1)
+    return sphere_directivity(lambda _: moved, shape, vibrating.frequencies)
 
 
 def plain_power(vibrating: VibratingSurface) -> Array:
@@ -149,7 +150,9 @@ def sphere(ka: float) -> VibratingSurface:
 
 def by_elements(vibrating: VibratingSurface) -> Directivity:
     """Directivity by boundary elements."""
-    return radiated_by_elements(vibrating.mesh, vibrating.motion, vibrating.frequencies)
+    mesh = vibrating.mesh
+    moved = np.moveaxis(mesh.at_middles(np.moveaxis(vibrating.motion, 0, -1)).real, -1, 0)
+    return radiated_by_elements(mesh, moved, vibrating.frequencies)
 
 
 def check_spheres() -> None:

@@ -76,8 +76,8 @@ def test_an_open_surface_has_no_boundary_mesh():
 def test_flows_of_a_moved_and_of_a_swelling_body_are_none_and_thrice_its_volume():
     box = trimesh.creation.box([0.1, 0.2, 0.3])
     mesh = boundary_mesh(box.vertices, box.faces, 500)
-    moved = np.broadcast_to([0.3, -0.2, 0.7], mesh.vertices.shape)
-    flows = mesh.flows(np.stack([moved, mesh.vertices], axis=2)).sum(axis=0)
+    moved = np.broadcast_to([0.3, -0.2, 0.7], mesh.middles.shape)
+    flows = mesh.flows(np.stack([moved, mesh.middles], axis=2)).sum(axis=0)
     volume = trimesh.Trimesh(mesh.vertices, mesh.faces).volume
     assert flows == pytest.approx([0.0, 3.0 * volume], abs=1e-12)
 

@@ -87,12 +87,14 @@ ARROWS = {
     "sound.heads": "",
     "sound.synthesis": "solver.response",
     "sound.clips": "sound sound.synthesis",
-    "sound.project": "solver.analysis solver.coarsening solver.files sound sound.clips",
+    "sound.project": """solver.analysis solver.coarsening solver.files sound sound.clips
+        sound.radiation""",
     "sound.design": """solver.analysis solver.coarsening solver.distribution solver.files
-        solver.linear solver.response solver.subspace sound sound.clips sound.project""",
+        solver.linear solver.response solver.subspace sound sound.clips sound.project
+        sound.radiation""",
     "sound.rendering": """solver.files solver.response solver.subspace sound sound.clips
         sound.design sound.project sound.synthesis""",
-    "sound.radiation": "sound",
+    "sound.radiation": "solver.response sound",
     "sound.building": """solver.analysis solver.files solver.response sound sound.design
         sound.project sound.rendering""",
     "sound.scenes": """solver.accuracy solver.analysis solver.files solver.refinement

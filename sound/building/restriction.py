@@ -21,6 +21,7 @@ from sound.design.interrupts import interruptible
 from sound.design.objective import DesignCost, Objective
 from sound.design.outcome import FINAL_TOLERANCE, own_damping
 from sound.design.pitch import partials_off, stretch_to
+from sound.design.place import with_pressures
 from sound.design.preparation import DesignProblem
 from sound.project.build import BuildSettings
 from sound.project.design import Design
@@ -186,11 +187,8 @@ class _Restriction:
             count = np.arange(len(hertz))
             elastic = modes[:, found.modes.rigid :]
             damping = own_damping(model, values[found.modes.rigid :], elastic, count, hertz)
-        heard, transfer = None, self._objective.heard
-        if transfer is not None:
-            heard = transfer.heard(model, modes[:, found.modes.rigid :], hertz)
         unit = size * float(design.settings.get("unit", 1.0))
-        return replace(
+        design = replace(
             design,
             strikes=[_larger(strike, size) for strike in design.strikes],
             young=self._choices.table.moduli(found.numbers),
@@ -205,8 +203,8 @@ class _Restriction:
             fine=None,
             damping=damping,
             fine_region=found.numbers,
-            heard=heard,
         )
+        return with_pressures(design, self._objective.heard)
 
     def _evidence(
         self, found: VoxelModes, rounded: VoxelModes, width: int, made: int

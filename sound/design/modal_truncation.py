@@ -18,6 +18,8 @@ MOST_BLOCKS = 16
 """Greatest number of blocks of a Krylov space."""
 MOST_PASSES = 3
 """Greatest number of orthogonalisations of a block; two are enough but for rounding."""
+EQUAL = 1e-10
+"""Relative difference of eigenvalues below which they count as equal."""
 CLEAR = 0.2
 """Least distance of a usable shift from all eigenvalues, over that of the best shift."""
 
@@ -115,7 +117,10 @@ def _bordered(matrix: Array, last: Array) -> Array:
 def _galerkin(stiffness: Array, held: Array, values: Array) -> Array:
     """Solutions (m, T N) of (lambda_k - H) y = h in an orthonormal basis, H (m, m) and h (m, T)."""
     ritz, rotation = la.eigh(stiffness, check_finite=False)
-    weights = (rotation.T @ held)[:, :, None] / (values[None, None, :] - ritz[:, None, None])
+    gaps = values[None, None, :] - ritz[:, None, None]
+    # Of modes of one eigenvalue, of which some were computed, the others have no such part.
+    apart = np.abs(gaps) > EQUAL * values
+    weights = np.where(apart, (rotation.T @ held)[:, :, None] / np.where(apart, gaps, 1.0), 0.0)
     return np.asarray(rotation @ weights.reshape(len(ritz), -1))
 
 

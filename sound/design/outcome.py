@@ -31,6 +31,7 @@ from sound.design.descent import cost_of
 from sound.design.fine_check import FineModes, FineSolid
 from sound.design.objective import DesignCost
 from sound.design.pitch import stretch_to
+from sound.design.place import with_pressures
 from sound.design.preparation import DesignProblem
 from sound.design.search import HistoryEntry, Search, require_modes
 from sound.design.simulation import Evaluation, Simulation
@@ -147,10 +148,6 @@ class Outcome:
                     order,
                     targets,
                 )
-        heard = None
-        if setting.objective.heard is not None:
-            elastic = modes[:, evaluation.modes.rigid :][:, order]
-            heard = setting.objective.heard.heard(model, elastic, stretch * hertz)
         seconds, evaluations = search.own_seconds, search.own_evaluations
         evidence: dict[str, Any] = {
             "method": problem.project.optimiser.method,
@@ -170,7 +167,7 @@ class Outcome:
             "n_dofs": simulation.model.n_dofs,
             "checks": [asdict(entry) for entry in search.checks],
         }
-        return Design(
+        design = Design(
             strikes=list(setting.strikes),
             targets=targets,
             coordinates=evaluation.z,
@@ -189,8 +186,8 @@ class Outcome:
             fine=None if fine is None else FineFrequencies(stretch * hertz, fine.order),
             damping=damping,
             fine_region=None if setting.placed is None else setting.placed.region,
-            heard=heard,
         )
+        return with_pressures(design, setting.objective.heard)
 
 
 def history_rows(history: Sequence[HistoryEntry]) -> NDArray[np.void]:

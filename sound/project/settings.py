@@ -16,7 +16,7 @@ from carillon.parameters.quantities import (
     between,
 )
 from sound.clips.formats import CLIP_FORMATS
-from sound.radiation.place import Place
+from sound.radiation.place import FarPlace
 
 LEAST_WEIGHT = 1e-12
 """Weight of frequencies or of amplitudes below which a search has nothing to lower."""
@@ -86,11 +86,11 @@ class ListenSettings:
         "boundary-elements as it is, which takes minutes once a mesh, and needs bempp-cl",
     )
 
-    def place(self, unit: float) -> Place | None:
+    def place(self, unit: float) -> FarPlace | None:
         """The place in the coordinates of a solid whose mesh has a unit [m]; None without one."""
         if self.at is None:
             return None
-        return Place(unit * np.array(self.at), self.radiation == "boundary-elements")
+        return FarPlace(unit * np.array(self.at), self.radiation == "boundary-elements")
 
 
 @parameters

@@ -55,8 +55,9 @@ def radiated_by_elements(
     frequencies: Array,
     groups: Iterable[slice] | None = None,
 ) -> Directivity:
-    """Sound that modes of a motion (V, 3, N) [kg^-1/2] at ascending frequencies (N,) [Hz] radiate.
+    """Sound that modes of ascending frequencies (N,) [Hz] radiate.
 
+    Their motion (3 F, 3, N) [kg^-1/2] is that at the middles of the edges, `BoundaryMesh.middles`.
     Modes of each of the `groups`, which are those of `same_frequency` unless told, share a
     frequency.  Raises UserError if bempp-cl, or OpenCL, is not installed.
     """

@@ -19,6 +19,7 @@ from sound.radiation.air import SOUND_SPEED
 from sound.radiation.boundary_elements import radiated_by_elements, same_frequency
 from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
 from sound.radiation.directivity import Directivity
+from sound.radiation.outer_surface import outer_faces
 from sound.radiation.sphere import radiated
 from sound.shape import Shape
 
@@ -31,7 +32,7 @@ FEWEST_EDGES_PER_WAVE = 4.0
 HIGHEST_HERTZ = 20_000.0
 """Frequency [Hz] from which a sphere stands for the surface, since nobody hears more."""
 _KIND, _SCHEMA = "directivity", 1
-_VERSION = 1  # counted up when other directivities are found than before
+_VERSION = 2  # counted up when other directivities are found than before
 """Kind and schema of entries in the cache."""
 
 
@@ -65,7 +66,7 @@ def modes_directivity(
         )
     if not count:
         return sphere()
-    moved, low = motion(mesh.vertices)[:, :, :count], frequencies[:count]
+    moved, low = motion(mesh.middles)[:, :, :count], frequencies[:count]
     key = hashlib.sha256(repr((_VERSION, FEWEST_EDGES_PER_WAVE)).encode())
     for values in (mesh.vertices, mesh.faces.astype(float), moved, low):
         key.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
@@ -85,7 +86,8 @@ def resolved_mesh(shape: Shape, highest: float) -> tuple[BoundaryMesh, float]:
 
     Raises UserError if the surface is open, or encloses nothing.
     """
-    mesh = boundary_mesh(shape.vertices, shape.faces, _triangles(shape, highest))
+    outer = outer_faces(shape.vertices, shape.faces)
+    mesh = boundary_mesh(shape.vertices, outer, _triangles(shape, highest))
     return mesh, SOUND_SPEED / (FEWEST_EDGES_PER_WAVE * _edge(mesh))
 
 

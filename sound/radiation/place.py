@@ -19,8 +19,8 @@ from sound.shape import Shape
 
 NEAREST = 2.0
 """Least distance of a place from the middle of a solid, over that of its farthest point."""
-BEYOND = 1.15
-"""Factor by which the band of a transfer goes beyond frequencies to either side."""
+BELOW, BEYOND = 0.5, 1.15
+"""Lowest and highest frequency of a transfer, over those that it is for."""
 STEP, TURN = 0.05, 0.8
 """Greatest distance of a transfer's frequencies, over the frequency, and greatest change of phase
 [rad] between them, of a wave over the radius of the solid."""
@@ -29,7 +29,7 @@ FIRST_STEP, FIRST_TURN = 0.2, 2.4
 
 
 @dataclass(frozen=True)
-class Place:
+class FarPlace:
     """A place (3,) [m] in the coordinates of a solid where it is heard, and whether its surface
     moves the air as that of a sphere does, or by boundary elements."""
 
@@ -38,7 +38,7 @@ class Place:
 
 
 def transfer_to(
-    place: Place, shape: Shape, centre: Array, hertz: tuple[float, float], name: str
+    place: FarPlace, shape: Shape, centre: Array, hertz: tuple[float, float], name: str
 ) -> Transfer:
     """Transfer to a place from a solid about its centre of mass (3,) [m], for frequencies between
     two [Hz].
@@ -61,7 +61,7 @@ def transfer_to(
     return Transfer.of_fields(surface.points + centre, surface.outward, band, fields)
 
 
-def require_far(place: Place, vertices: Array) -> None:
+def require_far(place: FarPlace, vertices: Array) -> None:
     """Raise UserError if a place is near to a surface of vertices (V, 3) [m]."""
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     distance = float(np.linalg.norm(place.at - middle))
@@ -77,18 +77,18 @@ def require_far(place: Place, vertices: Array) -> None:
 def frequencies_between(
     lowest: float, highest: float, radius: float, step: float, turn: float
 ) -> Array:
-    """Ascending frequencies (F,) [Hz] between two and, by `BEYOND`, on either side of them.
+    """Ascending frequencies (F,) [Hz] between two and, by `BELOW` and `BEYOND`, outside of them.
 
     Their distance is a `step` of the frequency, but lets no wave turn by more than `turn` [rad]
     over a radius [m].
 
     Examples
     --------
-    >>> frequencies_between(230.0, 3000.0, 0.1, 0.05, 0.8).round(1)[[0, 1, -1]].tolist()
+    >>> frequencies_between(400.0, 3000.0, 0.1, 0.05, 0.8).round(1)[[0, 1, -1]].tolist()
     [200.0, 210.0, 3450.0]
     """
     last = BEYOND * highest
-    steps, widest = [lowest / BEYOND], turn * SOUND_SPEED / (2.0 * np.pi * radius)
+    steps, widest = [BELOW * lowest], turn * SOUND_SPEED / (2.0 * np.pi * radius)
     while steps[-1] < last:
         steps.append(steps[-1] + min(step * steps[-1], widest))
     return np.array([*steps[:-1], last])
@@ -112,17 +112,11 @@ def _by_elements(
     last = hertz[count - 1]
     waves = SolvedWaves.of(mesh, direction, np.append(first[first < last], last), name)
     at_vertices = waves.at(hertz[:count])
-    following = np.roll(mesh.faces, -1, axis=1)
-    middles = 0.5 * (at_vertices[:, mesh.faces] + at_vertices[:, following])
-    low = middles.reshape(count, len(surface.points)) * surface.areas
+    low = mesh.at_middles(at_vertices) * surface.areas
     return surface, np.concatenate([low, sphere_fields(surface, direction, hertz[count:])])
 
 
 def _middles_of_edges(mesh: BoundaryMesh) -> SurfacePoints:
     """Points by which products of linear functions on triangles are integrated exactly."""
     normals, areas = mesh.normals_and_areas
-    corners = mesh.vertices[mesh.faces]
-    middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-    return SurfacePoints(
-        middles.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.repeat(areas / 3.0, 3)
-    )
+    return SurfacePoints(mesh.middles, np.repeat(normals, 3, axis=0), np.repeat(areas / 3.0, 3))

@@ -16,6 +16,7 @@ the plane wave itself.  This is exact for spheres whose velocity has orders up t
 volume that any solid displaces at low frequencies.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numba
@@ -25,6 +26,7 @@ from scipy.special import spherical_jn, spherical_yn
 from carillon.arrays import Array, Complex
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.directivity import Directivity, even_directions, harmonics, order_of
+from sound.radiation.outer_surface import outer_faces
 from sound.shape import Shape
 
 STEPS = 1 << 12
@@ -155,13 +157,19 @@ def sphere_fields(surface: SurfacePoints, direction: Array, hertz: Array) -> Com
     return np.asarray(-1j * pressure * field * surface.areas)
 
 
-def sphere_directivity(solid_motion: Array, shape: Shape, frequencies: Array) -> Directivity:
+def sphere_directivity(
+    motion: Callable[[Array], Array], shape: Shape, frequencies: Array
+) -> Directivity:
     """Directivity of modes as `radiated` has them, but with the phases of all orders.
 
-    `radiated` describes the parameters.  A single direction is then nearer to the truth, by far:
-    `python -m tests.radiation_bem` compares both.
+    `motion` gives the displacements (p, 3, N) [kg^-1/2] of points (p, 3) [m] of the surface in
+    modes of frequencies (N,) [Hz].  A single direction is then nearer to the truth, by far: `python
+    -m tests.radiation_bem` compares both.
     """
-    panels = _panels(solid_motion, shape)
+    surface = surface_points(shape)
+    flows = np.einsum("fin,fi,f->fn", motion(surface.points), surface.outward, surface.areas)
+    radius = float(np.sqrt(surface.areas.sum() / (4.0 * np.pi)))
+    panels = _Panels(surface.points, surface.outward, surface.areas, flows, radius)
     numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
     values, slopes = _hankel(numbers * panels.radius)
     scatter = -values / (numbers * slopes)
@@ -169,7 +177,7 @@ def sphere_directivity(solid_motion: Array, shape: Shape, frequencies: Array) ->
     order = order_of(float(numbers.max() * np.linalg.norm(shape.vertices, axis=1).max()))
     directions, shares = even_directions(2 * order)
     ways, facings = directions @ panels.centres.T, directions @ panels.normals.T
-    flows = np.ascontiguousarray(panels.flows)
+    flows = np.ascontiguousarray(flows)
     cosine, sine, steep_cosine, steep_sine = _waves(ways, facings, numbers, flows)
     heard = cosine - 1j * sine - numbers * scatter[2] * (1j * steep_cosine + steep_sine)
     heard += (scatter[0] - scatter[2]) * low.plain_slope
@@ -181,12 +189,14 @@ def sphere_directivity(solid_motion: Array, shape: Shape, frequencies: Array) ->
 
 
 def _panels(motion: Array, shape: Shape) -> _Panels:
-    """The triangles of a surface whose vertices move by (V, 3, N), none without area."""
-    corners = shape.vertices[shape.faces]
+    """The triangles of a surface whose vertices move by (V, 3, N), none without area or of a
+    cavity."""
+    outer = outer_faces(shape.vertices, shape.faces)
+    corners = shape.vertices[outer]
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(doubled, axis=1) / 2.0
     there = areas > 0.0
-    faces, areas = shape.faces[there], areas[there]
+    faces, areas = outer[there], areas[there]
     normals = doubled[there] / (2.0 * areas[:, None])
     outward = -shape.inward[faces].sum(axis=1)
     normals = np.where(((normals * outward).sum(axis=1) < 0.0)[:, None], -normals, normals)

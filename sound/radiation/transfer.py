@@ -70,6 +70,10 @@ class Transfer:
         """h (N,) [Pa m / (kg^-1/2 N s)] of modes (n_dofs, N) at frequencies (N,) [Hz]."""
         return np.asarray((self.at(hertz) * (modes.T @ self.loads(model))).sum(axis=1))
 
+    def covers(self, hertz: Array) -> bool:
+        """Whether frequencies [Hz] are all in its band."""
+        return bool(self.hertz[0] <= hertz.min() and hertz.max() <= self.hertz[-1])
+
     def at(self, hertz: Array) -> Complex:
         """c (N, r) at frequencies (N,) [Hz]; beyond the band those of its end."""
         return np.asarray(self._spline(self._inside(hertz)))

@@ -15,8 +15,8 @@ from solver.response.dissipation import decays
 from solver.response.points import motion_at
 from solver.response.response import Damping
 from solver.subspace.weyl import clusters
+from sound.design.place import transfer_of
 from sound.project.design import Design
-from sound.rendering.place import transfer_of
 
 
 @dataclass(frozen=True)

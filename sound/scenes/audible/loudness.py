@@ -55,7 +55,7 @@ def mode_directivity(body: Body, radiation: RadiationMethod) -> Directivity:
     if radiation == "boundary-elements":
         air = modes_directivity(body.entry.name, shape, body.motion, frequencies)
     elif of_place is not None:
-        air = sphere_directivity(body.motion(shape.vertices), shape, frequencies)
+        air = sphere_directivity(body.motion, shape, frequencies)
     else:
         air = radiated(body.motion(shape.vertices), shape, frequencies).directivity
     if not body.is_as_clips:
