@@ -1,5 +1,6 @@
 """Measured heads: files, directions between those measured, and what scenes sound like by them."""
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +12,21 @@ import pytest
 from carillon.errors import UserError
 from sound.heads.directions import DirectionMesh
 from sound.heads.measured_head import head_of_responses, read_head
-from sound.heads.sofa_file import read_sofa
+from sound.heads.sofa_file import (
+    MYSOFA_CHUNK,
+    MYSOFA_CHUNKS,
+    MYSOFA_TEXT,
+    MeasuredResponses,
+    read_sofa,
+    write_sofa,
+)
 from sound.radiation.air import SOUND_SPEED
 from sound.scenes.audible.hearing import HEAD_RADIUS, Head, heard
 from sound.scenes.audible.measured_hearing import filtered, heard_measured
 from sound.scenes.performance import Motion
 from sound.scenes.playing.play import perform
 from sound.scenes.scene_file import load_scene, scene_of
+from tests.programs import run
 from tests.scenes import ball, require_engine
 from tests.synthetic_heads import (
     RATE,
@@ -31,6 +40,8 @@ from tests.synthetic_heads import (
 
 KEMAR = Path("/usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa")
 """Head that Debian's package libmysofa1 brings."""
+OF_NETCDF = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"}
+"""Attributes by which netCDF tells what dimensions are."""
 DIRECTIONS = sphere_directions()
 USUAL = Anatomy()
 HEAD = head_of_responses(made_head(USUAL, DIRECTIONS), RATE)
@@ -114,6 +125,83 @@ def test_other_programs_read_what_is_written(sofa):
     head = sofar.read_sofa(str(sofa), verify=False, verbose=False)
     head.verify()
     np.testing.assert_array_equal(head.Data_IR, read_sofa(sofa).responses)
+
+
+@pytest.fixture(scope="module")
+def long_head(tmp_path_factory) -> Path:
+    """A head of more numbers than libmysofa reads of a chunk, with a text longer than it reads."""
+    path = tmp_path_factory.mktemp("heads") / "long.sofa"
+    count, samples = 1100, 500
+    responses = MeasuredResponses(
+        "long",
+        48_000,
+        spread_directions(count),
+        np.full(count, 1.2),
+        np.random.default_rng(1).normal(size=(count, 2, samples)),
+        np.zeros((count, 2)),
+    )
+    write_sofa(path, responses, "", "\u00e4" * MYSOFA_TEXT)
+    return path
+
+
+@pytest.mark.parametrize("name", ["written", "long_head"])
+def test_mysofa2json_reads_what_is_written(name, request):
+    program = shutil.which("mysofa2json")
+    if program is None:
+        pytest.skip("mysofa2json is not installed (apt-get install libmysofa-utils)")
+    path = request.getfixturevalue(name)
+    checked = run(program, "-c", path)
+    assert checked.returncode == 0, checked.stderr
+    content = json.loads(run(program, path).stdout)
+    expected = read_sofa(path)
+    assert content["Attributes"]["SOFAConventions"] == "SimpleFreeFieldHRIR"
+    data = content["Variables"]["Data.IR"]
+    assert data["DimensionNames"] == ["M", "R", "N"]
+    shape = expected.responses.shape
+    # It prints seven digits of float32.
+    np.testing.assert_allclose(
+        np.reshape(data["Values"], shape), expected.responses, rtol=1e-6, atol=1e-7
+    )
+
+
+@pytest.mark.parametrize("name", ["written", "long_head"])
+def test_a_head_is_stored_as_readers_of_sofa_without_hdf5_demand(name, request):
+    """What libmysofa 1.3 takes of HDF5, and the attributes and dimensions of AES69."""
+    with h5py.File(request.getfixturevalue(name)) as file:
+        required = {"Conventions", "Version", "SOFAConventions", "SOFAConventionsVersion"}
+        required |= {"APIName", "APIVersion", "AuthorContact", "DatabaseName", "DataType"}
+        required |= {"DateCreated", "DateModified", "License", "ListenerShortName", "Organization"}
+        assert required | {"RoomType", "Title"} <= set(file.attrs)
+        for place in (file, *file.values()):
+            assert h5py.h5o.get_info(place.id).hdr.version == 2
+            texts = [each for each in place.attrs if each not in OF_NETCDF]
+            for text in map(place.attrs.get_id, texts):
+                kind = text.get_type()
+                assert kind.get_strpad() == h5py.h5t.STR_NULLTERM
+                assert kind.get_size() <= MYSOFA_TEXT
+                assert text.get_space().get_simple_extent_type() != h5py.h5s.SIMPLE
+        # Further pieces of headers, of which 19 are read in one file.
+        assert sum(h5py.h5o.get_info(each.id).hdr.nchunks - 1 for each in file.values()) < 20
+        dimensions = {
+            "ListenerPosition": "IC",
+            "ListenerView": "IC",
+            "ListenerUp": "IC",
+            "ReceiverPosition": "RCI",
+            "SourcePosition": "MC",
+            "EmitterPosition": "ECI",
+            "Data.IR": "MRN",
+            "Data.SamplingRate": "I",
+            "Data.Delay": "MR",
+        }
+        assert set(file) == set(dimensions) | set("MRNEIC")
+        for name, letters in dimensions.items():
+            dataset = file[name]
+            assert [each[0].name for each in dataset.dims] == [f"/{each}" for each in letters]
+            assert dataset.shape == tuple(len(file[each]) for each in letters)
+            assert dataset.dtype == np.float64 and dataset.shuffle
+            assert dataset.compression == "gzip"
+            assert dataset.id.get_num_chunks() <= MYSOFA_CHUNKS
+            assert np.prod(dataset.chunks) <= MYSOFA_CHUNK
 
 
 def faults() -> dict[str, tuple]:

@@ -236,8 +236,11 @@ def _claimed(file: h5py.File, name: str, otherwise: Any = None) -> Any:
 
 
 def h5_in_memory(content: io.BytesIO) -> h5py.File:
-    """An HDF5 file that is written to memory, for formats of others."""
-    return h5py.File(content, "w")
+    """An HDF5 file that is written to memory, for formats of others.
+
+    It keeps the order in which things are made, as netCDF-4 demands.
+    """
+    return h5py.File(content, "w", track_order=True)
 
 
 def opened_h5(path: str | Path) -> h5py.File:

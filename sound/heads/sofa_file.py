@@ -31,6 +31,8 @@ RATES = (8_000.0, 384_000.0)
 """Least and greatest sampling rate [Hz] of a measurement."""
 PURE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
 """Name by which netCDF knows a dataset that stands for the length of a dimension alone."""
+MYSOFA_CHUNK, MYSOFA_CHUNKS, MYSOFA_TEXT = (1 << 20) - 1, 64, 4_000
+"""What libmysofa 1.3 reads at most: numbers of a chunk, chunks of a dataset, bytes of a text."""
 LONGEST_TEXT = 100
 """Longest text that is read of an attribute, in characters."""
 
@@ -85,7 +87,8 @@ def read_sofa(path: str | Path) -> MeasuredResponses:
 def write_sofa(path: str | Path, head: MeasuredResponses, listener: str, comment: str) -> None:
     """Write the responses of a head; the file is complete or absent.
 
-    `listener` is a short name of whose head it is, `comment` where it is from.
+    `listener` is a short name of whose head it is, `comment` where it is from. Data are stored as
+    netCDF stores them, which is all of HDF5 that libmysofa reads.
     """
     count, ears, samples = head.responses.shape
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")
@@ -118,18 +121,50 @@ def write_sofa(path: str | Path, head: MeasuredResponses, listener: str, comment
     content = io.BytesIO()
     with h5_in_memory(content) as file:
         for name, text in attributes.items():
-            file.attrs[name] = np.bytes_(text.encode()) if text else h5py.Empty("S1")
+            _write_text(file, name, text)
         for name, size in sizes.items():
-            file.create_dataset(name, data=np.zeros(size, ">f4")).make_scale(PURE.format(size))
+            scale = file.create_dataset(name, (size,), ">f4", track_order=True)
+            scale.make_scale(PURE.format(size))
+        # Numbers follow on all else: libmysofa reads headers in few pieces alone, and HDF5 begins
+        # another piece where it cannot make the last one longer.
         for name, (dimensions, values, kind) in placed.items():
-            dataset = file.create_dataset(name, data=values, compression="gzip")
+            dataset = _compressed(file, name, values.shape)
+            if kind is not None:
+                _write_text(dataset, "Type", kind[0])
+                _write_text(dataset, "Units", kind[1])
             for number, dimension in enumerate(dimensions):
                 dataset.dims[number].attach_scale(file[dimension])
-            if kind is not None:
-                dataset.attrs["Type"], dataset.attrs["Units"] = map(np.bytes_, kind)
-        file["Data.SamplingRate"].attrs["Units"] = np.bytes_("hertz")
+        _write_text(file["Data.SamplingRate"], "Units", "hertz")
+        for name, (_, values, _) in placed.items():
+            file[name][...] = values
     with atomic_path(path) as temporary:
         temporary.write_bytes(content.getbuffer())
+
+
+def _compressed(file: h5py.File, name: str, shape: tuple[int, ...]) -> h5py.Dataset:
+    """A dataset of float64 in chunks of whole rows."""
+    each = math.prod(shape[1:])
+    rows = min(shape[0], max(MYSOFA_CHUNK // each, math.ceil(shape[0] / MYSOFA_CHUNKS)))
+    return file.create_dataset(
+        name,
+        shape,
+        np.float64,
+        chunks=(rows, *shape[1:]),
+        shuffle=True,
+        compression="gzip",
+        track_order=True,
+    )
+
+
+def _write_text(place: h5py.File | h5py.Dataset, name: str, text: str) -> None:
+    """Write an attribute of the text's length in bytes, without a value if it is empty."""
+    content = np.array(text.encode()[:MYSOFA_TEXT].decode(errors="ignore").encode())
+    kind = h5py.h5t.C_S1.copy()
+    kind.set_size(max(content.itemsize, 1))
+    space = h5py.h5s.create(h5py.h5s.SCALAR if text else h5py.h5s.NULL)
+    attribute = h5py.h5a.create(place.id, name.encode(), kind, space)
+    if text:
+        attribute.write(content, mtype=kind)
 
 
 def _content(path: Path, file: h5py.File) -> MeasuredResponses:
