@@ -890,7 +890,7 @@ class Design:
 
         kind, settings = format_of(str(path), format), ExportSettings(points=points)
         if kind == PARTS:
-            from sound.export.parts import write_parts
+            from sound.export.parts_folder import write_parts
 
             write_parts(path, self.found)
             return

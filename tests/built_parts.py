@@ -27,7 +27,7 @@ from solver.__main__ import main as solver_main
 from solver.files.modes_file import read_modes
 from sound.__main__ import main
 from sound.design.pitch import cents, stretch_to
-from sound.export.parts import ALL, REGIONS, WHOLE, write_parts
+from sound.export.parts_folder import ALL, REGIONS, WHOLE, write_parts
 from sound.project.design import Design
 from sound.project.design_file import read_design
 

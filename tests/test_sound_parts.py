@@ -21,7 +21,8 @@ from sound.__main__ import main
 from sound.building.restriction import built
 from sound.export import parts as parts_module
 from sound.export.formats import export_design, format_of
-from sound.export.parts import MILLIMETRES, built_parts, write_parts
+from sound.export.parts import MILLIMETRES, built_parts
+from sound.export.parts_folder import write_parts
 from sound.export.threemf import MODEL, NAMESPACE
 from sound.export.voxel_surface import GAP, voxel_surface
 from sound.project.design_file import write_design

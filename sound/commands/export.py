@@ -124,7 +124,7 @@ def _write_folder(
 
 
 def _write_parts(options: ExportOptions, design: Design) -> dict[str, Any]:
-    from sound.export.parts import write_parts
+    from sound.export.parts_folder import write_parts
 
     written = write_parts(options.out, design)
     listed = ", ".join(f"{row['material']} {row['mass_g']:.4g} g" for row in written.rows)

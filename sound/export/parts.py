@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.ndimage as ndi
-import yaml
 
-from carillon import __version__
 from carillon.arrays import Array, Index, Integers
-from carillon.composition.materials import MATERIALS
 from carillon.errors import UserError
 from carillon.fem.geometry.size import length_in_words
-from carillon.files.atomic import atomic_path
 from sound.export.names import file_names
-from sound.export.threemf import ColouredPart, write_3mf
 from sound.export.voxel_surface import voxel_surface
 from sound.project.design import Design
 
@@ -34,19 +25,6 @@ REACH = 2
 """Voxels by which parts are made to go on beyond the voxels, before the surface cuts them."""
 LEAST_VOLUME = 1e-9
 """Volume of a piece, over that of its part, below which it is a trace of rounding."""
-ALL, WHOLE, TABLE, REGIONS = "parts.3mf", "solid.stl", "parts", "regions.yaml"
-"""Names of the files of all parts and of the solid that they make, of the tables without their
-endings, and of the regions."""
-FORMAT = "carillon parts 1"
-UNITS = {
-    "volume_mm3": "volume inside the surface, infill and air",
-    "mass_g": "mass by density and volume",
-    "extents_mm": "sides of the box around it",
-    "fraction": "of the volume that is filled, 1 of what is solid",
-    "density_kg_per_m3": "mass density, that of the infill with its air",
-    "pieces": "that do not touch each other",
-}
-"""Meaning of the columns."""
 
 
 @dataclass(frozen=True)
@@ -105,55 +83,12 @@ class BuiltParts:
     is_clipped: bool
 
 
-@dataclass(frozen=True)
-class WrittenParts:
-    """Rows of the parts and names of the files that were written, and whether they are clipped."""
-
-    rows: list[dict[str, Any]]
-    files: list[str]
-    is_clipped: bool
-
-
-def write_parts(folder: str | Path, design: Design) -> WrittenParts:
-    """Write an STL file for each material and of the solid, a 3MF file, tables and regions.
-
-    Lengths are millimetres, in the axes of the design. `carillon modes` reads `solid.stl` with
-    `regions.yaml`. Raises UserError if the design was not built, its parts are thinner than can be
-    printed, or the folder cannot be written.
-    """
-    made = built_parts(design)
-    folder = Path(folder)
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be made ({error.strerror})") from error
-    for part in made.parts:
-        _write_stl(folder / part.file, part.vertices, part.faces)
-    _write_stl(folder / WHOLE, made.vertices, made.faces)
-    coloured = [
-        ColouredPart(part.name, MILLIMETRES * part.vertices, part.faces, part.colour)
-        for part in made.parts
-    ]
-    write_3mf(folder / ALL, coloured)
-    rows = [part.row() for part in made.parts]
-    texts = {
-        REGIONS: regions_text(design, made.parts),
-        f"{TABLE}.csv": _csv(rows),
-        f"{TABLE}.json": _json(design, rows, made.is_clipped),
-    }
-    for name, text in texts.items():
-        with atomic_path(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    files = [*(part.file for part in made.parts), WHOLE, ALL, *texts]
-    return WrittenParts(rows, files, made.is_clipped)
-
-
 def built_parts(design: Design) -> BuiltParts:
     """Parts of a design that was built, cut by its surface if manifold3d is there to do it.
 
     Raises UserError if the design was not built, or its parts are thinner than can be printed.
     """
-    told = _told(design)
+    told = materials_of(design)
     labels = _labels(design)
     origin = design.fine_origin + design.fine_edge * (design.fine_grid.min(axis=0) - REACH)
     vertices, faces = voxel_surface(labels >= 0)
@@ -185,8 +120,11 @@ def _part(told: Mapping[str, Any], file: str, vertices: Array, faces: Index) -> 
     return BuiltPart(str(told["name"]), file, vertices, faces, colour, fraction, density, pieces)
 
 
-def _told(design: Design) -> list[Mapping[str, Any]]:
-    """Entries of the materials of a design, in the order of its table."""
+def materials_of(design: Design) -> list[Mapping[str, Any]]:
+    """Entries of the materials of a design that was built, in the order of its table.
+
+    Raises UserError if it was not built, or its parts are thinner than can be printed.
+    """
     build = design.evidence.get("build")
     if not build or design.fine_region is None:
         raise UserError(
@@ -255,60 +193,3 @@ def _pieces(faces: Index) -> int:
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
     links = sp.coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
     return int(sp.csgraph.connected_components(links, directed=False)[0])
-
-
-def _write_stl(path: Path, vertices: Array, faces: Index) -> None:
-    import trimesh
-
-    surface = trimesh.Trimesh(MILLIMETRES * vertices, faces, process=False)
-    content: Any = surface.export(file_type="stl")
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
-
-
-def regions_text(design: Design, parts: list[BuiltPart]) -> str:
-    """A file of regions, each a part, as `carillon modes` reads them."""
-    told = {str(each["name"]): each for each in _told(design)}
-    own = {each["name"]: each for each in design.settings["build"].get("own_materials", ())}
-    entries = []
-    for part in parts:
-        if part.name in own:
-            given = {key: value for key, value in own[part.name].items() if value is not None}
-        elif part.name in MATERIALS:
-            given = {"material": part.name}
-        else:
-            each = told[part.name]
-            given = {
-                "young": each["young_pa"],
-                "poisson": each["poisson"],
-                "density": each["density_kg_per_m3"],
-            }
-        place = {"mesh": ALL, "part": part.name, "unit": "mm"}
-        entries.append({**given, "name": part.name, **place})
-    return yaml.safe_dump({"regions": entries}, sort_keys=False, allow_unicode=True)
-
-
-def _csv(rows: list[dict[str, Any]]) -> str:
-    content = io.StringIO()
-    table = csv.writer(content, lineterminator="\n")
-    sides = ["x_mm", "y_mm", "z_mm"]
-    keys = [key for key in rows[0] if key != "extents_mm"]
-    table.writerow([*keys, *sides])
-    for row in rows:
-        numbers = [*(row[key] for key in keys), *row["extents_mm"]]
-        table.writerow([f"{each:.9g}" if isinstance(each, float) else each for each in numbers])
-    return content.getvalue()
-
-
-def _json(design: Design, rows: list[dict[str, Any]], is_clipped: bool) -> str:
-    content = {
-        "format": FORMAT,
-        "generator": f"Carillon {__version__}",
-        "name": design.name,
-        "unit": "mm",
-        "surfaces": "cut by the solid's surface" if is_clipped else "faces of voxels",
-        "voxel_mm": MILLIMETRES * design.fine_edge,
-        "units": UNITS,
-        "parts": rows,
-    }
-    return json.dumps(content, indent=1)
