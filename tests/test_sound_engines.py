@@ -14,10 +14,10 @@ import pytest
 import soundfile
 
 from sound.__main__ import main
-from sound.export.engine_folder import STAGING
 from sound.export.full_scale import loudest_peak
 from sound.export.mastering import onset_gains
 from sound.export.modal_model import ModalModel
+from sound.export.placing import STAGING
 from sound.export.sound_set import NEARBY, added_contact
 from sound.project.design_file import write_design
 from sound.rendering.listening import Listening

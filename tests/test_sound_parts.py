@@ -132,6 +132,66 @@ def test_modes_of_the_parts_are_those_of_the_design(design, tmp_path, voxel_face
     assert found[6:] == pytest.approx(design.frequencies, rel=1e-4)
 
 
+def of_materials(design, *names):
+    """The design with other names of its materials."""
+    build = design.evidence["build"]
+    told = [{**each, "name": name} for each, name in zip(build["materials"], names, strict=True)]
+    return replace(design, evidence={**design.evidence, "build": {**build, "materials": told}})
+
+
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_parts_of_a_former_export_make_room_and_others_stay(design, tmp_path, voxel_faced):
+    path = tmp_path / "made"
+    former = write_parts(path, of_materials(design, "Own metal", "steel"))
+    assert {"own_metal.stl", "steel.stl"} <= set(former.files) and not former.removed
+    for name in ("mine.stl", "notes.txt"):
+        (path / name).write_text("of others")
+    written = write_parts(path, of_materials(design, "aluminium", "steel"))
+    assert written.removed == ["own_metal.stl"]
+    assert names_in(path) == sorted(["mine.stl", "notes.txt", *written.files])
+    assert json.loads((path / "parts.json").read_text())["files"] == written.files
+
+
+def test_files_that_no_export_of_parts_writes_are_not_removed(design, tmp_path, voxel_faced):
+    path = tmp_path / "made"
+    path.mkdir()
+    kept = [path / "notes.txt", tmp_path / "outside.stl"]
+    for file in kept:
+        file.write_text("of others")
+    listed = ["notes.txt", "../outside.stl", str(tmp_path / "outside.stl"), 7]
+    table = {"format": "carillon parts 1", "files": listed}
+    (path / "parts.json").write_text(json.dumps(table))
+    assert not write_parts(path, design).removed
+    assert all(file.read_text() == "of others" for file in kept)
+
+
+def test_an_export_of_parts_that_fails_leaves_the_former_one(
+    design, tmp_path, voxel_faced, monkeypatch
+):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    path = tmp_path / "made"
+    write_parts(path, design)
+    before = {name: (path / name).read_bytes() for name in names_in(path)}
+    monkeypatch.setattr("sound.export.parts_folder.regions_text", full)
+    with pytest.raises(UserError, match="No space left on device"):
+        write_parts(path, of_materials(design, "one", "another"))
+    assert {name: (path / name).read_bytes() for name in names_in(path)} == before
+    with pytest.raises(UserError, match="No space left on device"):
+        write_parts(tmp_path / "new", design)
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_material_called_solid_has_a_file_of_its_own(design, tmp_path, voxel_faced):
+    written = write_parts(tmp_path / "made", of_materials(design, "Solid", "steel"))
+    assert {"solid.stl", "solid_2.stl"} <= set(written.files)
+    assert len(set(written.files)) == len(written.files)
+
+
 def test_the_command_writes_a_folder(design, tmp_path, capsys):
     write_design(tmp_path / "bar.h5", design)
     out = f"{tmp_path}/made/"

@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _require_output(options: ExportOptions, kind: str) -> None:
     if kind in (FOLDER, PARTS):
-        from sound.export.engine_folder import require_folder
+        from sound.export.placing import require_folder
 
         require_folder(options.out)
     else:
@@ -109,8 +109,7 @@ def _write_folder(
         f"{counted(sounds.variations, 'variation')}, 24 bits at {sounds.rate:,} Hz; levels in "
         f"sounds.csv and sounds.json; {counted(models, 'model')}; {size:,} bytes"
     )
-    if written.removed:
-        sentence += f"; {counted(len(written.removed), 'file')} of a former export removed"
+    sentence += _removal(written.removed)
     return {
         "out": options.out,
         "format": FOLDER,
@@ -139,9 +138,15 @@ def _write_parts(options: ExportOptions, design: Design) -> dict[str, Any]:
         "files": written.files,
         "parts": written.rows,
         "is_clipped": written.is_clipped,
+        "removed": written.removed,
         "sentence": f"{options.out}: {counted(len(written.rows), 'part')} in millimetres, "
-        f"{surfaces}: {listed}",
+        f"{surfaces}: {listed}{_removal(written.removed)}",
     }
+
+
+def _removal(files: list[str]) -> str:
+    """End of a sentence, of files of a former export that were removed."""
+    return f"; {counted(len(files), 'file')} of a former export removed" if files else ""
 
 
 def _content(kind: str, design: Design) -> str:

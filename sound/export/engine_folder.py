@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -11,28 +12,38 @@ from pathlib import Path
 
 from carillon.command_line.progress import say
 from carillon.errors import UserError
-from carillon.files.held_folder import HeldFolder
-from carillon.files.paths import cause, require_plain
 from sound.export.faust import faust_program
 from sound.export.formats import ExportSettings
 from sound.export.gltf import write_gltf
-from sound.export.level_table import LevelRow, levels_csv, levels_json, with_gains
+from sound.export.level_table import FORMAT, LevelRow, levels_csv, levels_json, with_gains
 from sound.export.modal_model import ModalModel
 from sound.export.modal_table import impact_objects, write_modal_csv, write_modal_json
 from sound.export.names import file_name, file_names
-from sound.export.placing import SOUNDS, TABLE, place, require_places
+from sound.export.placing import FileTable, filling
 from sound.export.sound_set import rendered_set, require_count
 from sound.export.sound_set_options import SoundSetOptions
 from sound.export.web_audio import web_audio_module
 from sound.export.wwise import wwise_import
 from sound.project.design import Design
 
+SOUNDS = "sounds"
+"""Name of the folder of sounds, and of the tables beside it."""
+TABLE = f"{SOUNDS}.json"
+"""Name of the table that lists the files of an export."""
 WWISE = f"{SOUNDS}-wwise.txt"
 """Name of the list that Wwise imports."""
 TABLES = (WWISE, f"{SOUNDS}.csv", TABLE)
 """Names of the tables of sounds."""
-STAGING = ".carillon-export-"
-"""Beginning of the name of the folder in which all is written before it gets its place."""
+SOUND_SET = FileTable(
+    TABLE,
+    FORMAT,
+    re.compile(
+        rf"{SOUNDS}/[a-z0-9_]+\.wav|[a-z0-9_]+\.(glb|dsp|js|impobj)|[a-z0-9_]+-modes\.(json|csv)"
+        rf"|{SOUNDS}-wwise\.txt|{SOUNDS}\.(csv|json)"
+    ),
+    SOUNDS,
+)
+"""How an export knows its files."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +57,6 @@ class WrittenFolder:
     levels: list[LevelRow]
     missing: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
-
-
-def require_folder(path: str | Path) -> Path:
-    """Check, before the work, that a folder can be filled: it is there, or can be made.
-
-    Raises UserError if it cannot.
-    """
-    path = Path(path)
-    require_plain(path)
-    if path.exists() and not path.is_dir():
-        raise UserError(f"{path}: is there and is no folder; name another")
-    parent = path if path.is_dir() else path.absolute().parent
-    if not parent.is_dir():
-        raise UserError(f"{path}: the folder {parent} does not exist; create it first")
-    if not os.access(parent, os.W_OK):
-        raise UserError(f"{path}: cannot be written; name a folder you may write to")
-    return path
 
 
 def write_engine_folder(
@@ -82,23 +76,9 @@ def write_engine_folder(
     settings = settings or ExportSettings()
     model = ModalModel.of_design(design, settings.points, name)
     require_count(len(model.points), options)
-    path = require_folder(path)
-    is_new = not path.exists()
-    try:
-        path.mkdir(exist_ok=True)
-        folder = HeldFolder(path)
-        try:
-            folder.remove_passing(STAGING)
-            require_places(folder, TABLES)
-            with folder.passing(STAGING) as staged:
-                written = _write_all(staged, design, model, options, settings)
-                removed = place(folder, staged, written.files)
-        finally:
-            folder.close()
-            if is_new and not any(path.iterdir()):
-                path.rmdir()
-    except OSError as error:
-        raise UserError(f"{path}: could not be written ({cause(error)})") from error
+    with filling(path, SOUND_SET, TABLES) as folder:
+        written = _write_all(folder.staged, design, model, options, settings)
+        removed = folder.place(written.files)
     return replace(written, removed=removed)
 
 

@@ -11,9 +11,10 @@ from typing import Any
 
 from carillon import __version__
 from sound.export.mastering import PEAK_DECIBELS
-from sound.export.placing import FORMAT
 from sound.levels import decibels
 
+FORMAT = "carillon sound set 1"
+"""Name of the format of the table, in its key `format`."""
 COLUMNS = {
     "file": "name of the WAV file",
     "point": "name of the struck point",

@@ -21,6 +21,8 @@ MILLIMETRES = 1e3
 """Of a metre."""
 THINNEST = 0.4e-3
 """Width [m] of the line of a usual printer, below which nothing can be printed."""
+SOLID = "solid"
+"""Name of the file of all parts together, without its ending, which no part may have."""
 REACH = 2
 """Voxels by which parts are made to go on beyond the voxels, before the surface cuts them."""
 LEAST_VOLUME = 1e-9
@@ -100,7 +102,7 @@ def built_parts(design: Design) -> BuiltParts:
         labels = np.where(distance <= np.sqrt(3.0) * REACH, labels[tuple(nearest)], -1)
         whole = design.surface_vertices, np.asarray(design.surface_faces, dtype=np.int64)
     numbers = [number for number in range(len(told)) if (labels == number).any()]
-    names = file_names([str(told[number]["name"]) for number in numbers])
+    names = file_names([SOLID, *(str(told[number]["name"]) for number in numbers)])[1:]
     parts = []
     for number, name in zip(numbers, names, strict=True):
         vertices, faces = voxel_surface(labels == number)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,16 +15,21 @@ import yaml
 from carillon import __version__
 from carillon.arrays import Array, Index
 from carillon.composition.materials import MATERIALS
-from carillon.errors import UserError
-from carillon.files.atomic import atomic_path
-from sound.export.parts import MILLIMETRES, BuiltPart, built_parts, materials_of
+from sound.export.parts import MILLIMETRES, SOLID, BuiltPart, BuiltParts, built_parts, materials_of
+from sound.export.placing import FileTable, filling
 from sound.export.threemf import ColouredPart, write_3mf
 from sound.project.design import Design
 
-ALL, WHOLE, TABLE, REGIONS = "parts.3mf", "solid.stl", "parts", "regions.yaml"
-"""Names of the files of all parts and of the solid that they make, of the tables without their
-endings, and of the regions."""
-FORMAT = "carillon parts 1"
+ALL, WHOLE, REGIONS = "parts.3mf", f"{SOLID}.stl", "regions.yaml"
+"""Names of the files of all parts, of the solid that they make, and of the regions."""
+TABLES = ("parts.csv", "parts.json")
+"""Names of the tables."""
+PARTS = FileTable(
+    "parts.json",
+    "carillon parts 1",
+    re.compile(r"[a-z0-9_]+\.stl|parts\.(3mf|csv|json)|regions\.yaml"),
+)
+"""How an export knows its files."""
 UNITS = {
     "volume_mm3": "volume inside the surface, infill and air",
     "mass_g": "mass by density and volume",
@@ -37,26 +43,37 @@ UNITS = {
 
 @dataclass(frozen=True)
 class WrittenParts:
-    """Rows of the parts and names of the files that were written, and whether they are clipped."""
+    """Rows of the parts and names of the files that were written, and whether they are clipped.
+
+    `removed` are files of a former export that this one has not written again.
+    """
 
     rows: list[dict[str, Any]]
     files: list[str]
     is_clipped: bool
+    removed: list[str]
 
 
-def write_parts(folder: str | Path, design: Design) -> WrittenParts:
-    """Write an STL file for each material and of the solid, a 3MF file, tables and regions.
+def write_parts(path: str | Path, design: Design) -> WrittenParts:
+    """Fill a folder, made if it is missing: an STL file for each material and of the solid, a 3MF
+    file, tables and regions.
 
     Lengths are millimetres, in the axes of the design. `carillon modes` reads `solid.stl` with
-    `regions.yaml`. Raises UserError if the design was not built, its parts are thinner than can be
-    printed, or the folder cannot be written.
+    `regions.yaml`. Once all are written, files of a former export, which its `parts.json` lists,
+    are removed or replaced; others stay. Raises UserError if the design was not built, its parts
+    are thinner than can be printed, or the folder cannot be written, and leaves the folder as it is
+    then.
     """
     made = built_parts(design)
-    folder = Path(folder)
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be made ({error.strerror})") from error
+    rows = [part.row() for part in made.parts]
+    files = [*(part.file for part in made.parts), WHOLE, ALL, REGIONS, *TABLES]
+    with filling(path, PARTS, files) as folder:
+        _write_all(folder.staged, design, made, files)
+        removed = folder.place(files)
+    return WrittenParts(rows, files, made.is_clipped, removed)
+
+
+def _write_all(folder: Path, design: Design, made: BuiltParts, files: list[str]) -> None:
     for part in made.parts:
         _write_stl(folder / part.file, part.vertices, part.faces)
     _write_stl(folder / WHOLE, made.vertices, made.faces)
@@ -66,16 +83,13 @@ def write_parts(folder: str | Path, design: Design) -> WrittenParts:
     ]
     write_3mf(folder / ALL, coloured)
     rows = [part.row() for part in made.parts]
-    texts = {
-        REGIONS: regions_text(design, made.parts),
-        f"{TABLE}.csv": _csv(rows),
-        f"{TABLE}.json": _json(design, rows, made.is_clipped),
-    }
-    for name, text in texts.items():
-        with atomic_path(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    files = [*(part.file for part in made.parts), WHOLE, ALL, *texts]
-    return WrittenParts(rows, files, made.is_clipped)
+    texts = (
+        regions_text(design, made.parts),
+        _csv(rows),
+        _json(design, rows, made.is_clipped, files),
+    )
+    for name, text in zip((REGIONS, *TABLES), texts, strict=True):
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _write_stl(path: Path, vertices: Array, faces: Index) -> None:
@@ -83,8 +97,7 @@ def _write_stl(path: Path, vertices: Array, faces: Index) -> None:
 
     surface = trimesh.Trimesh(MILLIMETRES * vertices, faces, process=False)
     content: Any = surface.export(file_type="stl")
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
+    path.write_bytes(content)
 
 
 def regions_text(design: Design, parts: list[BuiltPart]) -> str:
@@ -121,9 +134,9 @@ def _csv(rows: list[dict[str, Any]]) -> str:
     return content.getvalue()
 
 
-def _json(design: Design, rows: list[dict[str, Any]], is_clipped: bool) -> str:
+def _json(design: Design, rows: list[dict[str, Any]], is_clipped: bool, files: list[str]) -> str:
     content = {
-        "format": FORMAT,
+        "format": PARTS.format,
         "generator": f"Carillon {__version__}",
         "name": design.name,
         "unit": "mm",
@@ -131,5 +144,6 @@ def _json(design: Design, rows: list[dict[str, Any]], is_clipped: bool) -> str:
         "voxel_mm": MILLIMETRES * design.fine_edge,
         "units": UNITS,
         "parts": rows,
+        "files": files,
     }
     return json.dumps(content, indent=1)

@@ -8,34 +8,112 @@ import re
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from carillon.errors import UserError
 from carillon.files.held_folder import HeldFolder
+from carillon.files.paths import cause, require_plain
 
-SOUNDS = "sounds"
-"""Name of the folder of sounds, and of the tables beside it."""
-TABLE = f"{SOUNDS}.json"
-"""Name of the table that lists the files of an export."""
-FORMAT = "carillon sound set 1"
-"""Name of the format of the table of sounds, in its key `format`."""
 LARGEST_TABLE = 64 * 2**20
 """Length [bytes] of a table that is read."""
-
-_OWN = re.compile(
-    rf"{SOUNDS}/[a-z0-9_]+\.wav|[a-z0-9_]+\.(glb|dsp|js|impobj)|[a-z0-9_]+-modes\.(json|csv)"
-    rf"|{SOUNDS}-wwise\.txt|{SOUNDS}\.(csv|json)"
-)
-"""Names of files that an export writes."""
+STAGING = ".carillon-export-"
+"""Beginning of the name of the folder in which all is written before it gets its place."""
 
 
-def require_places(folder: HeldFolder, files: Sequence[str]) -> None:
-    """Check that files `NAME` and `sounds/NAME` can be put into a folder.
+@dataclass(frozen=True)
+class FileTable:
+    """The table (JSON) by which an export into a folder knows the files of a former one.
+
+    Its key `files` lists them, as names in the folder.
+    """
+
+    name: str
+    format: str
+    """What its key `format` says."""
+    own: re.Pattern[str]
+    """Names of files that an export writes: others are not removed, though listed."""
+    folder: str = ""
+    """Name of a folder in the folder, in which files lie too; none if empty."""
+
+
+@dataclass(frozen=True)
+class Filling:
+    """A folder that is being filled: files are written into `staged` first."""
+
+    staged: Path
+    _folder: HeldFolder
+    _table: FileTable
+
+    def place(self, files: Sequence[str]) -> list[str]:
+        """Move files to their places, in their order, and remove those of a former export.
+
+        These are files that the folder's table lists, and that are not among `files`; the list of
+        them is returned. Other files stay, and so does what is no regular file. Signals that end
+        the process wait until all files have their places. Raises UserError, before anything has
+        changed, if something else than a file has one of the names, a link above all.
+        """
+        folder = self._folder
+        _require_places(folder, self._table, files)
+        with _unstopped():
+            former = _former(folder, self._table)
+            removed = _removed(folder, [each for each in former if each not in set(files)])
+            for file in files:
+                target = folder.path / file
+                target.parent.mkdir(exist_ok=True)
+                os.replace(self.staged / file, target)
+        return removed
+
+
+def require_folder(path: str | Path) -> Path:
+    """Check, before the work, that a folder can be filled: it is there, or can be made.
+
+    Raises UserError if it cannot.
+    """
+    path = Path(path)
+    require_plain(path)
+    if path.exists() and not path.is_dir():
+        raise UserError(f"{path}: is there and is no folder; name another")
+    parent = path if path.is_dir() else path.absolute().parent
+    if not parent.is_dir():
+        raise UserError(f"{path}: the folder {parent} does not exist; create it first")
+    if not os.access(parent, os.W_OK):
+        raise UserError(f"{path}: cannot be written; name a folder you may write to")
+    return path
+
+
+@contextmanager
+def filling(path: str | Path, table: FileTable, certain: Sequence[str]) -> Iterator[Filling]:
+    """Fill a folder, made if it is missing; it stays as it is until `Filling.place`.
+
+    Raises UserError if it cannot be written, or if something else than a file has the name of one
+    that is `certain` to be written.
+    """
+    path = require_folder(path)
+    is_new = not path.exists()
+    try:
+        path.mkdir(exist_ok=True)
+        folder = HeldFolder(path)
+        try:
+            folder.remove_passing(STAGING)
+            _require_places(folder, table, certain)
+            with folder.passing(STAGING) as staged:
+                yield Filling(staged, folder, table)
+        finally:
+            folder.close()
+            if is_new and not any(path.iterdir()):
+                path.rmdir()
+    except OSError as error:
+        raise UserError(f"{path}: could not be written ({cause(error)})") from error
+
+
+def _require_places(folder: HeldFolder, table: FileTable, files: Sequence[str]) -> None:
+    """Check that files can be put into a folder, and into the one in it.
 
     Raises UserError if something else than a file has one of the names, a link above all, or if
-    `sounds` is no folder or may not be written to.
+    the folder in it is none or may not be written to.
     """
-    for parent, names in {SOUNDS: [], **_by_parent(files)}.items():
+    for parent, names in {table.folder: [], **_by_parent(files)}.items():
         with _inside(folder, parent) as inner:
             if inner is None:
                 continue
@@ -45,35 +123,17 @@ def require_places(folder: HeldFolder, files: Sequence[str]) -> None:
                 inner.require_replaceable(name)
 
 
-def place(folder: HeldFolder, staged: Path, files: Sequence[str]) -> list[str]:
-    """Move files from a folder `staged` on the same disk to their places, in their order.
-
-    Before that, files that the folder's table lists, and that are not among these, are removed; the
-    list of these is returned.  Other files stay, and so does what is no regular file.  Signals that
-    end the process wait until all files have their places.  Raises UserError as `require_places`
-    does, before anything has changed.
-    """
-    require_places(folder, files)
-    with _unstopped():
-        removed = _removed(folder, [each for each in _former(folder) if each not in set(files)])
-        for file in files:
-            target = folder.path / file
-            target.parent.mkdir(exist_ok=True)
-            os.replace(staged / file, target)
-    return removed
-
-
-def _former(folder: HeldFolder) -> list[str]:
+def _former(folder: HeldFolder, table: FileTable) -> list[str]:
     """Files of a former export by its table, none if there is no such table."""
     try:
-        table = json.loads(folder.read(TABLE, LARGEST_TABLE))
+        content = json.loads(folder.read(table.name, LARGEST_TABLE))
     except (UserError, ValueError, RecursionError):
         return []
-    if not isinstance(table, dict) or table.get("format") != FORMAT:
+    if not isinstance(content, dict) or content.get("format") != table.format:
         return []
-    files = table.get("files")
+    files = content.get("files")
     listed = files if isinstance(files, list) else []
-    return [each for each in listed if isinstance(each, str) and _OWN.fullmatch(each)]
+    return [each for each in listed if isinstance(each, str) and table.own.fullmatch(each)]
 
 
 def _removed(folder: HeldFolder, files: Sequence[str]) -> list[str]:
@@ -90,7 +150,7 @@ def _removed(folder: HeldFolder, files: Sequence[str]) -> list[str]:
 
 
 def _by_parent(files: Sequence[str]) -> dict[str, list[str]]:
-    """Names of files by the folder that they lie in: `SOUNDS`, or an empty text."""
+    """Names of files by the name of the folder in it that they lie in; empty if in itself."""
     names: dict[str, list[str]] = {}
     for file in files:
         path = PurePosixPath(file)
