@@ -16,7 +16,7 @@ from sound.__main__ import main
 from sound.building.cost_of_build import with_cost_of_build
 from sound.building.flips import FlipLimits, improved
 from sound.building.grouping import cubes, width_of
-from sound.building.restriction import built
+from sound.building.restriction import built, known_width
 from sound.building.rounding import roundings
 from sound.building.voxel_solid import VoxelSolid
 from sound.design.optimise import optimise
@@ -54,6 +54,15 @@ def designed(folder, build, **keys):
 @pytest.fixture(scope="module")
 def field(tmp_path_factory):
     return designed(tmp_path_factory.mktemp("build"), TWO)
+
+
+def described(folder, build):
+    """Arguments that design a bar by clips of four partials, in a file."""
+    small_project.write_clips(folder, np.array([400.0, 930.0, 1700.0, 2600.0]))
+    keys = {**small_project.PROJECT, "build": build, "modes": 4}
+    keys["optimiser"] = {"seconds": None, "evaluations": 12, "workers": 1}
+    (folder / "bar.yaml").write_text(yaml.safe_dump(keys))
+    return ["design", str(folder / "bar.yaml"), "--out", str(folder / "bar.h5")]
 
 
 def asking(problem, **build):
@@ -277,6 +286,34 @@ def test_parts_that_are_thicker_than_the_solid_are_refused(field):
     assert width_of(0.0011, 0.001, problem.setting.mesh.grid) == 2
 
 
+@pytest.mark.parametrize(
+    ("build", "voxels"),
+    [({"size": "mesh"}, 1), ({"size": "mesh", "at_least": "20 mm"}, 2), ({}, None)],
+)
+def test_the_width_of_parts_is_known_before_the_search_where_the_size_is(build, voxels, tmp_path):
+    made = project(tmp_path, {**TWO, **build})
+    problem = prepare(made, small_project.targets(made))
+    width = known_width(problem)
+    assert width == (None if voxels is None else voxels * problem.setting.mesh.edge)
+    if voxels is not None:
+        assert built(problem, optimise(problem)).evidence["build"]["at_least_m"] == width
+
+
+@pytest.mark.parametrize("size", ["mesh", "free"])
+def test_parts_that_cannot_be_printed_are_told_with_the_design(size, tmp_path, capsys, monkeypatch):
+    """Before the search, too, if the solid stays as large as its mesh."""
+    monkeypatch.setattr("sound.project.build.THINNEST", 0.1)
+    arguments = described(tmp_path, {**TWO, "size": size})
+    assert main(arguments) == 0
+    told, line = capsys.readouterr(), "warning: parts are as thin as"
+    assert (line in told.err) == (size == "mesh")
+    assert f"{line} " in told.out and "expected 10 cm or more" in told.out
+    monkeypatch.undo()
+    assert main([*arguments, "--evaluations", "1"]) == 0
+    told = capsys.readouterr()
+    assert line not in told.out + told.err
+
+
 def test_a_field_that_no_search_has_changed_is_refused(field):
     problem, design = field
     uniform = replace(design, coordinates=np.zeros_like(design.coordinates))
@@ -292,21 +329,16 @@ def test_the_cost_of_the_build_is_told(field):
 
 
 def test_the_command_builds_and_tells_what_it_costs(tmp_path, capsys):
-    small_project.write_clips(tmp_path, np.array([400.0, 930.0, 1700.0, 2600.0]))
-    build = {**TWO, "at_least": "12 mm"}
-    described = {**small_project.PROJECT, "build": build, "modes": 4}
-    described["optimiser"] = {"seconds": None, "evaluations": 12, "workers": 1}
-    (tmp_path / "bar.yaml").write_text(yaml.safe_dump(described))
-    out = str(tmp_path / "bar.h5")
-    assert main(["design", str(tmp_path / "bar.yaml"), "--out", out, "--json"]) == 0
+    arguments = described(tmp_path, {**TWO, "at_least": "12 mm"})
+    assert main([*arguments, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)["build"]
     assert {"median_cents", "worst_cents", "distance_db", "verdict"} <= set(told["before"])
     assert {"median_cents", "worst_cents", "distance_db", "verdict"} <= set(told["after"])
     assert told["at_least_m"] >= 0.012
+    out = tmp_path / "bar.h5"
     coordinates = read_design(out).coordinates
     # The field is there still, and is built again by one evaluation more.
-    again = ["design", str(tmp_path / "bar.yaml"), "--out", out, "--evaluations", "1"]
-    assert main(again) == 0
+    assert main([*arguments, "--evaluations", "1"]) == 0
     printed = capsys.readouterr().out
     assert "built of aluminium" in printed and "what that costs: partials off by" in printed
     assert np.array_equal(read_design(out).coordinates, coordinates)

@@ -67,6 +67,23 @@ def built(
         return _Restriction(problem, design, settings, watch, interrupted).run(field)
 
 
+def known_width(problem: DesignProblem) -> float | None:
+    """Edge [m] of the cubes of voxels that will be of one material, if it is known before a search.
+
+    None where a region is of one material, or the pitch sets the size of the solid. Raises
+    UserError if the solid is too thin for what the project asks.
+    """
+    settings, mesh = problem.project.build, problem.setting.mesh
+    if settings.per != "voxel" or _is_free(problem):
+        return None
+    return mesh.edge * width_of(settings.at_least, mesh.edge, mesh.grid)
+
+
+def _is_free(problem: DesignProblem) -> bool:
+    """Whether the pitch sets the size."""
+    return problem.project.build.size == "free" and not problem.setting.objective.absolute
+
+
 class _Restriction:
     def __init__(
         self,
@@ -80,7 +97,7 @@ class _Restriction:
         self._watch, self._interrupted = watch, interrupted
         self._choices = settings.choices()
         setting = problem.setting
-        self._is_free = settings.size == "free" and not setting.objective.absolute
+        self._is_free = _is_free(problem)
         objective = setting.objective
         if not self._is_free and not objective.absolute:
             objective = Objective(

@@ -98,6 +98,8 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
         initial = read_design(out)
     say("preparing: partials of the clips, voxels, modes of the solid", sys.stderr.isatty())
     problem = prepare(project)
+    if project.build.is_asked and not options.watch:
+        _say_too_thin(problem)
     if initial is not None:
         require_same_voxels(problem, initial)
         so_far = initial.history["evaluations"][-1:].sum()
@@ -126,6 +128,15 @@ def _search(options: DesignOptions, settings: SearchOptions) -> int:
     summary = summarise(result)
     print(json.dumps(summary) if options.json else sentences(out, result, summary))
     return 0
+
+
+def _say_too_thin(problem: DesignProblem) -> None:
+    """Say that parts cannot be printed, as far as it is known before the search."""
+    from sound.building.restriction import known_width
+    from sound.project.build import too_thin
+
+    if fault := too_thin(known_width(problem)):
+        say(f"warning: {fault}")
 
 
 def _built(problem: DesignProblem, design: Design) -> Design:

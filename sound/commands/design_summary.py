@@ -10,6 +10,7 @@ import numpy as np
 from carillon.command_line.counts import counted
 from carillon.fem.geometry.size import length_in_words, lengths_in_words
 from sound.design.objective import fall
+from sound.project.build import too_thin
 
 if TYPE_CHECKING:  # Its import takes long, and `--help` needs none.
     from sound.project.design import Design
@@ -179,7 +180,8 @@ def _material_sentences(design: Design, summary: dict[str, Any]) -> list[str]:
 
 
 def _build_sentences(build: dict[str, Any] | None) -> list[str]:
-    """Shares of the materials, and errors before and after; empty of a continuous field."""
+    """Shares of the materials, errors before and after, and whether parts are too thin to print;
+    empty of a continuous field."""
     if build is None:
         return []
     used = [each for each in build["materials"] if each["volume_m3"]]
@@ -200,7 +202,10 @@ def _build_sentences(build: dict[str, Any] | None) -> list[str]:
             f"; from the clip {before['distance_db']:.1f} dB ({before['verdict']}) before, "
             f"{after['distance_db']:.1f} dB ({after['verdict']}) as built"
         )
-    return [f"built of {shares}, in {what}{', ' if size else ''}{size}", text]
+    lines = [f"built of {shares}, in {what}{', ' if size else ''}{size}", text]
+    if fault := too_thin(build["at_least_m"]):
+        lines.append(f"warning: {fault}")
+    return lines
 
 
 def _off(told: dict[str, float]) -> str:

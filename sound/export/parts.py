@@ -12,15 +12,13 @@ import scipy.ndimage as ndi
 
 from carillon.arrays import Array, Index, Integers
 from carillon.errors import UserError
-from carillon.fem.geometry.size import length_in_words
 from sound.export.names import file_names
 from sound.export.voxel_surface import voxel_surface
+from sound.project.build import too_thin
 from sound.project.design import Design
 
 MILLIMETRES = 1e3
 """Of a metre."""
-THINNEST = 0.4e-3
-"""Width [m] of the line of a usual printer, below which nothing can be printed."""
 SOLID = "solid"
 """Name of the file of all parts together, without its ending, which no part may have."""
 REACH = 2
@@ -133,13 +131,8 @@ def materials_of(design: Design) -> list[Mapping[str, Any]]:
             "the design is a continuous field, which has no parts; name real materials below build "
             "in its project, and design again"
         )
-    width = build.get("at_least_m")
-    if width is not None and width < THINNEST:
-        raise UserError(
-            f"build.at_least: parts are as thin as {length_in_words(width)}, expected "
-            f"{length_in_words(THINNEST)} or more, the width of a printer's line; set it, or a "
-            "lower resolution"
-        )
+    if fault := too_thin(build.get("at_least_m")):
+        raise UserError(fault)
     told: list[Mapping[str, Any]] = build["materials"]
     return told
 

@@ -11,6 +11,7 @@ from carillon.arrays import Array
 from carillon.composition.entries import RegionEntry, Vector
 from carillon.composition.materials import MATERIALS, named_material
 from carillon.errors import UserError
+from carillon.fem.geometry.size import length_in_words
 from carillon.fem.regions import Regions
 from carillon.parameters import REQUIRED, OneOf, Within, option, parameters
 from carillon.parameters.fields import parameters_of
@@ -28,6 +29,8 @@ LEAST_FRACTION, MOST_LEVELS = 0.05, 20
 """Least fraction of an infill, below which walls do not hang together, and most of its levels."""
 GREY = (0.6, 0.6, 0.6)
 """Colour of a material that has none."""
+THINNEST = 0.4e-3
+"""Width [m] of the line of a usual printer, below which nothing can be printed."""
 ALIKE = 1e-3
 """Relative difference of all constants below which two materials are one and the same."""
 
@@ -181,6 +184,24 @@ class Choices:
 
     def __len__(self) -> int:
         return len(self.table)
+
+
+def too_thin(width: float | None) -> str:
+    """What is wrong with parts of a width [m] that cannot be printed; empty if they can.
+
+    `width` is None where it is not known.
+
+    Examples
+    --------
+    >>> too_thin(0.001), too_thin(1e-4)[:32]
+    ('', 'parts are as thin as 0.1 mm, exp')
+    """
+    if width is None or width >= THINNEST:
+        return ""
+    return (
+        f"parts are as thin as {length_in_words(width)}, expected {length_in_words(THINNEST)} or "
+        "more, the width of a printer's line; set build.at_least to that, or a lower resolution"
+    )
 
 
 def _require_different(rows: list[Regions]) -> None:
