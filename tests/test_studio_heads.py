@@ -6,6 +6,7 @@ import os
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from scipy.io import wavfile
@@ -93,6 +94,9 @@ async def test_from_a_folder_to_a_blend_that_the_command_line_writes_too(folder)
     assert main([*words, "--out", str(folder / "other.sofa")]) == 0
     written, other = (read_head(folder / f"{name}.sofa") for name in ("people-blend", "other"))
     assert distance(written, other) < 1e-6
+    for name in ("people-blend", "other"):
+        with h5py.File(folder / f"{name}.sofa") as file:
+            assert file.attrs["Comment"] == b"preferred after 5 comparisons"
 
 
 async def test_both_heads_of_a_pair_are_heard_from_its_direction(folder):

@@ -124,8 +124,7 @@ def _weights(space: HeadSpace, blended: BlendOptions) -> tuple[Array, str]:
     count = len(space.heads)
     if blended.calibration is not None:
         calibration = load_calibration(blended.calibration, space)
-        comparisons = counted(calibration.count, "comparison")
-        return space.weights(calibration.best), f"preferred after {comparisons}"
+        return space.weights(calibration.best), calibration.comment
     if blended.mix is None:
         return np.full(count, 1.0 / count), "all alike"
     weights = np.zeros(count)

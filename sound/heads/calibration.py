@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import require_file
@@ -73,6 +74,11 @@ class HeadCalibration:
     def count(self) -> int:
         """Number of comparisons that were made."""
         return len(self.comparisons)
+
+    @property
+    def comment(self) -> str:
+        """What a file of the blend that is preferred says of it."""
+        return f"preferred after {counted(self.count, 'comparison')}"
 
     def next_pair(self) -> tuple[Array, Array]:
         """Two points (K,) to compare next: the same ones until they are answered."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.command_line.counts import counted
 from carillon.errors import UserError
 from sound.clips.wav import as_wav
 from sound.heads.calibration import HeadCalibration, calibration_of, load_calibration
@@ -114,10 +113,8 @@ class HeadsProcess:
     def write(self, out: str) -> int:
         """Write the blend that is preferred to a file (SOFA); the number of comparisons."""
         blend = self._space.blend(self._space.weights(self._present.best))
-        comparisons = self._present.count
-        comment = f"preferred after {counted(comparisons, 'comparison')}"
-        write_sofa(out, blend.responses(), "blend", comment)
-        return comparisons
+        write_sofa(out, blend.responses(), "blend", self._present.comment)
+        return self._present.count
 
     def _heads(self, pair: str) -> dict[str, MeasuredHead]:
         """The two heads of a pair by part, as scenes hear by them; kept for the next sound."""
