@@ -17,9 +17,11 @@ from sound.heads.calibration import calibration_of, load_calibration
 from sound.heads.head_space import distance, read_heads
 from sound.heads.measured_head import read_head
 from sound.heads.stimulus import at_ears, noise_bursts
+from sound.levels import faded
+from sound.synthesis.sinusoids import damped_sinusoids
 from studio.binary import pack
 from studio.interface import NotFoundError
-from studio.processes.heads import SEED
+from studio.processes.heads import FADE_SECONDS, SEED, STRIKE_SECONDS, StruckModes
 from studio.session import heads as session_heads
 from studio.session import open_studio
 from studio.session.document import Document
@@ -139,6 +141,15 @@ async def test_a_strike_of_the_solid_is_heard_by_the_heads(folder):
         heard = samples(await heads.sound(0, "A", strike))
         spectrum = np.abs(np.fft.rfft(heard[:, 0]))
         assert np.argmax(spectrum) * 44_100 / len(heard) == pytest.approx(440.0, abs=2.0)
+
+
+def test_a_strike_fades_as_other_sounds_do():
+    modes = np.array([440.0]), np.array([0.5]), np.array([1.0])
+    rate, count = 8_000, round(8_000 * STRIKE_SECONDS)
+    ringing = damped_sinusoids(*modes, np.zeros(1), rate, count)
+    expected, seconds = faded(ringing, rate, FADE_SECONDS)
+    assert seconds == FADE_SECONDS and np.abs(ringing[-80:]).max() > 0.4
+    np.testing.assert_array_equal(StruckModes(*modes).samples(rate), expected)
 
 
 @pytest.mark.parametrize("count", [0, 3, 6])

@@ -17,6 +17,7 @@ from sound.heads.head_space import HeadSpace, head_files, read_heads
 from sound.heads.measured_head import MeasuredHead
 from sound.heads.sofa_file import write_sofa
 from sound.heads.stimulus import at_ears, direction_of, noise_bursts
+from sound.levels import faded
 from sound.synthesis.sinusoids import damped_sinusoids
 
 SEED = 1
@@ -39,13 +40,11 @@ class StruckModes:
 
     def samples(self, rate: float) -> Array:
         """Samples (s,) of the strike."""
-        sine = np.zeros(len(self.hertz))
-        count, faded = (round(seconds * rate) for seconds in (STRIKE_SECONDS, FADE_SECONDS))
+        sine, count = np.zeros(len(self.hertz)), round(STRIKE_SECONDS * rate)
         sound = damped_sinusoids(
             self.hertz, self.dampings, self.amplitudes, sine, round(rate), count
         )
-        sound[-faded:] *= np.linspace(1.0, 0.0, faded)
-        return sound
+        return faded(sound, round(rate), FADE_SECONDS)[0]
 
 
 class HeadsProcess:
