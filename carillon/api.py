@@ -46,6 +46,7 @@ from carillon.fem.model import (
 )
 from carillon.fem.moduli import require_moduli
 from carillon.fem.regions import Regions
+from carillon.notebook.card import hertz, html_or_text
 from carillon.parameters import Check, checked, parameters
 from carillon.parameters.quantities import (
     Count,
@@ -71,6 +72,7 @@ if TYPE_CHECKING:
 
     from forests.model import Model
     from solver.files.modes_file import ModesFile
+    from solver.refinement.errors import ExpectedErrors
     from solver.verification.audit import Audit
     from solver.verification.comparison import SpectrumComparison
     from sound.clips.extraction import ModalSound
@@ -132,6 +134,26 @@ class Mesh:
         size = _wall_size(wall, wall_side)
         surface = surface_of_triangles(vertices, faces, name, is_sheet=size is not None)
         return cls(surface, name, wall=None if size is None else size.of(surface, name))
+
+    def __repr__(self) -> str:
+        return f"<Mesh {self.name!r}: {self._in_words()}>"
+
+    def _in_words(self) -> str:
+        from carillon.fem.geometry.size import length_in_words, lengths_in_words
+
+        wall = "" if self.wall is None else f", a wall of {length_in_words(self.wall.thickness)}"
+        return f"{lengths_in_words(self.extents.tolist())}, {len(self.faces):,} triangles{wall}"
+
+    def _repr_html_(self) -> str:
+        return html_or_text(self, self._html)
+
+    def _html(self) -> str:
+        from carillon.notebook.card import card
+        from carillon.notebook.solid import solid
+        from carillon.notebook.triangles import Triangles
+
+        shown = Triangles.of_surface(self.skin.vertices, self.skin.faces)
+        return card(f"Mesh {self.name}", [self._in_words()], solid(shown, f"Mesh {self.name}"))
 
     @property
     def vertices(self) -> Array:
@@ -332,6 +354,20 @@ class Material:
             if not (isinstance(value, int | float) and value == default):
                 raise ValueError(f"found {name} beside regions, which tell it; leave one out")
 
+    def __repr__(self) -> str:
+        if self.regions:
+            return (
+                f"<Material of {len(self.regions)} regions: {', '.join(map(_named, self.regions))}>"
+            )
+        young: Any = self.young
+        if callable(young):
+            told = "young by a function"
+        elif np.ndim(young) == 0:
+            told = f"young {young!r}" if isinstance(young, str) else f"young {float(young):.4g} Pa"
+        else:
+            told = f"young an array {np.shape(young)}"
+        return f"<Material: {told}, poisson {self.poisson:.3g}, {self.density:,.5g} kg/m^3>"
+
     # Arrays of moduli have no truth value.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
@@ -391,6 +427,10 @@ class Material:
         return require_moduli(np.broadcast_to(young, mesh.n_cells), mesh.n_cells, "factor")
 
 
+def _named(region: RegionEntry) -> str:
+    return f"{region.name} of {region.material}" if region.material else str(region.name)
+
+
 def _require_no_material(young: str) -> None:
     """Say how a material such as brass is given, where its name stands in place of a modulus."""
     from carillon.composition.materials import MATERIALS
@@ -430,6 +470,19 @@ class Solution:
     def mesh(self) -> HexMesh:
         """Hexahedra of the solid, or the voxels that carry the material of finite cells."""
         return self._file().mesh
+
+    def __repr__(self) -> str:
+        rigid = 0 if self.solid is None else self.solid.rigid_modes
+        elastic = self.frequencies[rigid:]
+        count = f"{len(elastic)} {'' if self.solid is None else 'elastic '}modes"
+        between = f", {hertz(elastic[0])} to {hertz(elastic[-1])} Hz" if len(elastic) else ""
+        worst = float(np.max(self.residuals, initial=0.0))
+        return f"<Solution: {count}{between}, residuals up to {worst:.1e}>"
+
+    def _repr_html_(self) -> str:
+        from solver.exchange.modes_html import modes_html
+
+        return html_or_text(self, lambda: modes_html(self._file()))
 
     def plot(self, mode: int) -> Figure:
         """A figure of the solid in a mode, counted from 1, rigid ones included.
@@ -678,6 +731,35 @@ def compare(solution: Solution | str | Path, truth: Solution | str | Path) -> Sp
     return compare_modes(_modes_of(solution), _modes_of(truth))
 
 
+def estimate(solution: Solution) -> ExpectedErrors:
+    """How far frequencies of finite cells are expected to be above those of the solid itself.
+
+    The `errors` of what is returned are relative, of the elastic modes up to number 60; it has
+    their `rms` and the `worst`. The expected error of voxels is what `carillon modes` tells.
+    Raises UserError for a solution of voxels or of a file, and where most of the strain energy is
+    in cells of several materials, or that are held.
+
+    Examples
+    --------
+    >>> plate = ca.solve("builtin:plate", resolution=12, modes=12, discretisation="finite-cell")
+    >>> ca.estimate(plate)
+    <ExpectedErrors of frequencies 7 to 12: ...>
+    """
+    from carillon.fem.finite_cells.model import FiniteCellModel
+    from solver.accuracy.estimate import estimate_cell_errors
+
+    if not isinstance(solution, Solution):
+        raise UserError(f"found {solution!r:.100}, expected a solution")
+    file = solution._file()
+    if not isinstance(file.model, FiniteCellModel):
+        raise UserError(
+            "errors of voxels are not estimated here; expected finite cells, "
+            "solve with discretisation='finite-cell'"
+        )
+    assert file.modes is not None
+    return estimate_cell_errors(file.model, file.eigenvalues, file.modes).errors
+
+
 def audit(solution: Solution | str | Path, tolerance: float = 1e-7) -> Audit:
     """Check a spectrum by itself: residuals, orthogonality, and a count by inertia.
 
@@ -776,6 +858,77 @@ def render(
     return render_sound(heard.solid, hits, length, *how, options=options).samples
 
 
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """Samples with their rate, which a notebook plays.
+
+    Raises UserError for samples that are no numbers, or a rate out of range.
+
+    Examples
+    --------
+    >>> tone = ca.Sound(0.5 * np.sin(0.1 * np.arange(22_050)))
+    >>> tone
+    <Sound: 0.5 s at 44,100 Hz, peak -6.0 dBFS>
+    >>> np.asarray(tone).shape
+    (22050,)
+    """
+
+    samples: Array
+    """(s,), or (s, c) of several channels; full scale is 1."""
+    rate: int = SAMPLE_RATE
+    """Samples per second [Hz]."""
+
+    def __post_init__(self) -> None:
+        from sound.bounds import SampleRate
+
+        samples = _numbers("samples", self.samples, 2, "samples (s,)")
+        if not np.isfinite(samples).all():
+            raise UserError("samples: found NaN or infinity, expected finite numbers")
+        object.__setattr__(self, "samples", samples)
+        object.__setattr__(self, "rate", checked("rate", self.rate, SampleRate))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The sound in a file; of several channels the loudest one, as clips are read.
+
+        Raises UserError if it is missing, damaged or silent.
+        """
+        from sound.clips.wav import read_wav
+
+        return cls(*read_wav(path, allow_clipped=True))
+
+    @property
+    def seconds(self) -> float:
+        """Length [s]."""
+        return len(self.samples) / self.rate
+
+    @property
+    def loudness(self) -> float:
+        """Integrated loudness [LUFS] (ITU-R BS.1770); -inf of silence."""
+        from sound.levels import loudness_lufs
+
+        return loudness_lufs(self.samples, self.rate)
+
+    def save(self, path: str | Path, bits: int = 32) -> None:
+        """Write it as a sound file, see `carillon.write_wav`."""
+        write_wav(path, self.samples, self.rate, bits=bits)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(self.samples, dtype=dtype) if copy else np.asarray(self.samples, dtype)
+
+    def __repr__(self) -> str:
+        from sound.levels import decibels
+
+        peak = float(np.abs(self.samples).max())
+        level = f"peak {decibels(peak):.1f} dBFS" if peak else "silent"
+        return f"<Sound: {self.seconds:.3g} s at {self.rate:,} Hz, {level}>"
+
+    def _repr_html_(self) -> str:
+        from sound.clips.sound_html import sound_html
+
+        return html_or_text(self, lambda: sound_html(self.samples, self.rate))
+
+
 def write_wav(
     path: str | Path,
     samples: ArrayLike,
@@ -807,7 +960,7 @@ def write_wav(
 
 
 def extract(
-    clip: str | Path | ArrayLike, rate: int = SAMPLE_RATE, modes: int | None = None
+    clip: str | Path | Sound | ArrayLike, rate: int = SAMPLE_RATE, modes: int | None = None
 ) -> ModalSound:
     """Frequencies, dampings and amplitudes of the modes that the recording of a strike holds.
 
@@ -816,7 +969,7 @@ def extract(
     Parameters
     ----------
     clip
-        A sound file, or samples (s,) at `rate` [Hz].
+        A sound file, a sound, or samples (s,) at `rate` [Hz].
     modes
         Number of modes to keep, those with most energy; all that are found unless given.
 
@@ -832,6 +985,8 @@ def extract(
     from sound.clips.files import extract_file
 
     count = checked("modes", modes, Count | None)
+    if isinstance(clip, Sound):
+        rate, clip = clip.rate, clip.samples
     if isinstance(clip, str | Path):
         return extract_file(clip, count)
     hertz = checked("rate", rate, SampleRate)
@@ -844,6 +999,17 @@ class Design:
 
     found: FoundDesign
     """All that its file holds."""
+
+    def __repr__(self) -> str:
+        from sound.export.design_html import summary
+
+        verdict = f", {self.verdict}" if self.verdict else ""
+        return f"<Design of {self.found.name!r}: {summary(self.found)}{verdict}>"
+
+    def _repr_html_(self) -> str:
+        from sound.export.design_html import design_html
+
+        return html_or_text(self, lambda: design_html(self.found))
 
     @property
     def frequencies(self) -> Array:
@@ -861,7 +1027,9 @@ class Design:
     @property
     def verdict(self) -> str:
         """Whether it sounds like its clips, why not, and what may help; empty if unknown."""
-        return str((self.found.evidence.get("verdict") or {}).get("sentence", ""))
+        from sound.export.design_html import verdict_of
+
+        return verdict_of(self.found)
 
     @property
     def young(self) -> Array:
@@ -979,6 +1147,10 @@ class Forests:
     """File that they are from."""
     model: Model
     """All that it holds."""
+
+    def __repr__(self) -> str:
+        made = f"{self.model.forests.trees} trees each, objective {self.model.objective}"
+        return f"<Forests of {self.path.name!r}: {made}, Poisson's ratio {self.model.poisson:g}>"
 
     @classmethod
     def load(cls, path: str | Path | None = None) -> Self:

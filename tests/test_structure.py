@@ -32,6 +32,7 @@ EVERYBODY = (
     "carillon.fem.finite_cells",
     "carillon.composition",
     "carillon.drawing",
+    "carillon.notebook",
 )
 """Packages that all others may import."""
 
@@ -45,8 +46,10 @@ ARROWS = {
     "carillon.command_line": """carillon carillon.files carillon.parameters carillon.processes
         carillon.records""",
     "carillon.fem.geometry": "carillon carillon.command_line carillon.files carillon.parameters",
-    "carillon.fem": "carillon carillon.fem.geometry carillon.files carillon.processes",
     "carillon.drawing": "carillon.fem.geometry",
+    "carillon.notebook": "carillon carillon.drawing carillon.fem.geometry",
+    "carillon.fem": """carillon carillon.fem.geometry carillon.files carillon.notebook
+        carillon.processes""",
     "carillon.fem.finite_cells": "carillon carillon.fem carillon.fem.geometry",
     "carillon.composition": """carillon carillon.fem carillon.fem.finite_cells carillon.fem.geometry
         carillon.files carillon.parameters""",
@@ -66,7 +69,6 @@ ARROWS = {
     "solver.subspace": "solver.assembly solver.distribution",
     "solver.linear": "solver.assembly solver.distribution",
     "solver.response": "solver.files solver.subspace",
-    "solver.exchange": "solver.assembly solver.files solver.response",
     "solver.reference": "solver.assembly solver.linear solver.subspace",
     "solver.correction": "solver.assembly solver.distribution solver.linear solver.subspace",
     "solver.hcms": "solver.assembly solver.distribution solver.linear solver.subspace",
@@ -78,6 +80,7 @@ ARROWS = {
     "solver": "solver.analysis",
     "solver.refinement": """solver.analysis solver.assembly solver.coarsening solver.correction
         solver.distribution solver.files solver.linear solver.subspace""",
+    "solver.exchange": "solver.assembly solver.files solver.refinement solver.response",
     "solver.accuracy": "solver.analysis solver.distribution solver.files solver.refinement",
     "solver.commands": """solver.accuracy solver.analysis solver.coarsening solver.correction
         solver.distribution solver.exchange solver.files solver.linear solver.refinement
@@ -102,7 +105,7 @@ ARROWS = {
     "sound.scenes.film": "sound sound.scenes",
     "sound.scenes.contact": "sound.scenes",
     "sound.export": """solver.assembly solver.files solver.response solver.verification
-        sound sound.clips sound.project sound.rendering sound.scenes""",
+        sound sound.clips sound.design sound.project sound.rendering sound.scenes""",
     "sound.scenes.audible": """sound.heads sound.radiation sound.rendering
         sound.scenes sound.scenes.contact sound.synthesis""",
     "sound.commands": """solver.response sound sound.building sound.clips sound.design sound.export

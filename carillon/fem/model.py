@@ -19,7 +19,9 @@ from carillon.fem.moduli import at_points, require_moduli
 from carillon.fem.regions import DEFAULT_DENSITY as DEFAULT_DENSITY
 from carillon.fem.regions import Damping as Damping
 from carillon.fem.regions import RegionOf, Regions
+from carillon.fem.solid_html import solid_html
 from carillon.fem.supports import Attached, Supports
+from carillon.notebook.card import html_or_text
 
 RIGID_MODES = 6
 """Motions without strain of a connected free body."""
@@ -38,6 +40,15 @@ class Solid(ABC):
     """Region of each cell, (m,) or that of its octants (m, 8); None if there is one."""
     supports: Supports | None
     """What holds it, or is fixed to it; None of a free solid."""
+
+    def __repr__(self) -> str:
+        kind = type(self).__name__
+        held = "free" if self.supports is None else "held"
+        elements = len(self.connectivity)
+        return f"<{kind}: {elements:,} elements, {self.n_dofs:,} unknowns, {held}>"
+
+    def _repr_html_(self) -> str:
+        return html_or_text(self, lambda: solid_html(self))
 
     @property
     def poisson(self) -> float | None:
@@ -153,7 +164,7 @@ class Solid(ABC):
         return self.elements.nodal_mass(chosen)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ElasticModel(Solid):
     """A hexahedral mesh with material, an element for each of its cells."""
 

@@ -8,6 +8,8 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
+from carillon.notebook.card import card, html_or_text
+from carillon.notebook.chart import Axis, range_of, stems
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
 from solver.coarsening.forest import FOREST
@@ -40,6 +42,20 @@ class ExpectedErrors:
     errors: Array
     rigid: int = RIGID_MODES
     """Number of rigid modes, before the elastic ones."""
+
+    def __repr__(self) -> str:
+        return f"<ExpectedErrors {in_words(self.attributes(''), '')}>"
+
+    def _repr_html_(self) -> str:
+        return html_or_text(self, self._html)
+
+    def _html(self) -> str:
+        numbers = self.rigid + 1.0 + np.arange(len(self.errors))
+        errors = 100.0 * self.errors
+        low, high = range_of([0.0, *errors])
+        y = Axis("expected error [%]", low, high)
+        chart = stems(Axis("mode", self.rigid, self.last), y, numbers, errors)
+        return card("Expected errors", [in_words(self.attributes(""), "")], chart)
 
     @property
     def rms(self) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from carillon.errors import UserError
 from carillon.files.paths import by_stem
+from carillon.notebook.card import card, html_or_text, named_values
 from solver.correction.criteria import EIGENVALUE_TOLERANCE
 from solver.files.modes_file import ModesFile, frequencies, read_modes
 from solver.verification.allowance import (
@@ -34,6 +35,27 @@ class Audit(ModesEvidence):
     """
 
     faults: list[str]
+
+    def __repr__(self) -> str:
+        said = "; ".join(self.faults) or "no fault"
+        return f"<Audit of {self.modes} modes of {self.unknowns:,} unknowns: {said}>"
+
+    def _repr_html_(self) -> str:
+        return html_or_text(self, self._html)
+
+    def _html(self) -> str:
+        counted = "unknown" if self.counted is None else f"{self.counted}"
+        rows = [
+            ("modes counted by inertia", counted),
+            ("modes that are there below that value", f"{self.expected}"),
+            ("rigid modes", f"{self.rigid_modes}"),
+            ("departure from orthogonality", f"{self.orthogonality:.1e}"),
+            ("residual, largest", f"{self.residual_max:.1e}"),
+            ("residual in energy, largest", f"{max(self.energy_residuals, default=0.0):.1e}"),
+            ("mass", f"{self.mass:.4g} kg"),
+        ]
+        facts = [f"{self.modes} modes of {self.unknowns:,} unknowns"]
+        return card("; ".join(self.faults) or "Audit: no fault", facts, named_values(rows))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON."""

@@ -13,6 +13,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.geometry import blocks_with_coarse, prolongation
 from carillon.fem.model import ElasticModel, Solid
 from carillon.files.paths import by_stem
+from carillon.notebook.card import card, html_or_text, named_values, percent
 from solver.assembly.sparse import assembled
 from solver.files.modes_file import ModesFile, read_elastic, require_elastic, require_same_solid
 from solver.response.points import interpolation
@@ -66,6 +67,36 @@ class SpectrumComparison:
     own mesh, where numbers tell."""
     material: dict[str, Any] | None = None
     """In what the material differs, see `material_difference`; None where it is the same."""
+
+    def __repr__(self) -> str:
+        rms, worst = self.frequency_rms_relative_error, self.frequency_max_relative_error_7_60
+        return (
+            f"<SpectrumComparison of {self.modes_compared} elastic modes: frequencies "
+            f"{percent(rms)} off (rms), up to {percent(worst)}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_or_text(self, self._html)
+
+    def _html(self) -> str:
+        values = self.eigenvalue_relative_error
+        rows = [
+            ("frequencies, rms", percent(self.frequency_rms_relative_error)),
+            ("frequencies 7 to 60, rms", percent(self.frequency_rms_relative_error_7_60)),
+            ("frequencies 7 to 60, worst", percent(self.frequency_max_relative_error_7_60)),
+            ("eigenvalues, median", percent(values["median"])),
+            ("eigenvalues, 90th percentile", percent(values["p90"])),
+            ("eigenvalues, worst", percent(values["max"])),
+            ("angle between shapes, largest", f"{np.degrees(self.subspace_angle_max):.2g}°"),
+            ("residual, largest", f"{self.residual_max:.1e}"),
+        ]
+        if self.matched and self.matched["rms"] is not None:
+            rows.append(("frequencies matched by shape, rms", percent(self.matched["rms"])))
+            rows.append(("modes with another number", f"{self.matched['moved']}"))
+        facts = [f"{self.modes_compared} elastic modes compared"]
+        if self.material:
+            facts.append(f"materials differ in {', '.join(self.material)}")
+        return card("Distance from the truth", facts, named_values(rows))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dictionary, ready for JSON, without what there is not."""

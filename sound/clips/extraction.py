@@ -19,6 +19,7 @@ from carillon.arrays import Array
 from carillon.command_line.counts import counted
 from carillon.command_line.progress import Watch, watched
 from carillon.errors import UserError
+from carillon.notebook.card import hertz, html_or_text
 from carillon.processes.threads import blas_threads
 from sound.bounds import LONGEST_COMPARED, require_level
 from sound.clips.candidates import LEAST_DECAY
@@ -62,6 +63,16 @@ class ModalSound:
     """int [Hz]: samples per second."""
     evidence: dict[str, Any]
     """dict: details of the search and of its accuracy; plain values."""
+
+    def __repr__(self) -> str:
+        modes = self.frequencies
+        between = f", {hertz(modes[0])} to {hertz(modes[-1])} Hz" if len(modes) else ""
+        return f"<ModalSound: {len(modes)} modes{between}>"
+
+    def _repr_html_(self) -> str:
+        from sound.clips.sound_html import modal_sound_html
+
+        return html_or_text(self, lambda: modal_sound_html(self))
 
     @property
     def energies(self) -> Array:

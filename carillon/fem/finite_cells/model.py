@@ -155,7 +155,7 @@ class CellElements(Elements):
         return at_nodes(self.degree, self.own_mass(chosen), self.kinds[chosen])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FiniteCellModel(Solid):
     """Finite cells with a modulus for every voxel that holds material."""
 

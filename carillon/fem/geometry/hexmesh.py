@@ -37,6 +37,9 @@ class HexMesh:
     hanging: np.ndarray | None = None
     """(m,) uint8: bit c tells whether local corner c hangs; None likewise."""
 
+    def __repr__(self) -> str:
+        return f"<HexMesh: {self.n_cells:,} cells of {self.edge:.4g} m, {self.n_nodes:,} nodes>"
+
     @cached_property
     def nodes(self) -> np.ndarray:
         """Positions of the nodes (n, 3) [m]."""
