@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,6 +65,7 @@ from carillon.parameters.quantities import (
 )
 
 if TYPE_CHECKING:
+    import pyvista
     import trimesh
     from matplotlib.figure import Figure
     from mpi4py import MPI
@@ -176,6 +177,16 @@ class Mesh:
         round but for here.
         """
         return self.surface if self.wall is None else self.wall.skin
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """The triangles of `skin` for PyVista.
+
+        Raises UserError if that is not installed.
+        """
+        from carillon.drawing.with_pyvista import load_pyvista
+
+        faces = np.asarray(self.skin.faces)
+        return load_pyvista().PolyData.from_regular_faces(np.asarray(self.skin.vertices), faces)
 
     def hexahedra(self, resolution: int) -> HexMesh:
         """The voxels inside, `resolution` of them along the longest side.
@@ -484,26 +495,72 @@ class Solution:
 
         return html_or_text(self, lambda: modes_html(self._file()))
 
-    def plot(self, mode: int) -> Figure:
-        """A figure of the solid in a mode, counted from 1, rigid ones included.
+    @overload
+    def plot(
+        self, mode: int, path: str | Path | None = ..., by: Literal["matplotlib"] = ...
+    ) -> Figure: ...
 
-        Raises UserError if there is no such mode.
+    @overload
+    def plot(
+        self, mode: int, path: str | Path | None = ..., *, by: Literal["pyvista"]
+    ) -> pyvista.Plotter: ...
+
+    def plot(
+        self, mode: int, path: str | Path | None = None, by: str = "matplotlib"
+    ) -> Figure | pyvista.Plotter:
+        """A picture of the solid in a mode, counted from 1, rigid ones included.
+
+        Raises UserError if there is no such mode, PyVista is not installed, or the file cannot be
+        written.
+
+        Parameters
+        ----------
+        mode
+            Number of the mode.
+        path
+            File that the picture is written to, without a window; the ending tells its kind.
+        by
+            `matplotlib`, which returns a figure, or `pyvista`, which returns a plotter, whose
+            `show` opens it: in a window, or in the notebook.
+
+        Examples
+        --------
+        >>> from tempfile import TemporaryDirectory
+        >>> box = ca.solve("builtin:box", resolution=4, modes=8)
+        >>> with TemporaryDirectory() as folder:
+        ...     figure = box.plot(7, f"{folder}/box.png")
+        >>> figure.axes[0].get_title().startswith("mode 7, ")
+        True
         """
-        from matplotlib.figure import Figure
-
         from carillon.drawing.solid import draw
         from solver.response.points import voxel_motion
 
         numbers = range(1, len(self.frequencies) + 1)
         if mode not in numbers:
             raise UserError(f"mode {mode!r}: expected a whole number, 1 to {len(numbers)}")
+        if by not in ("matplotlib", "pyvista"):
+            raise UserError(f"by: found {by!r:.80}, expected 'matplotlib' or 'pyvista'")
         index = numbers.index(mode)
         file = self._file()
         assert file.modes is not None
-        figure = Figure(figsize=(6.0, 4.5), layout="constrained")
+        if by == "pyvista":
+            from solver.exchange.modes_pyvista import plot_mode
+
+            return plot_mode(file, index + 1, path)
+        from carillon.drawing.figure import ShownFigure
+
+        figure = ShownFigure(figsize=(6.0, 4.5), layout="constrained")
         axes = figure.add_subplot(projection="3d")
         draw(axes, file.mesh, voxel_motion(file.model, file.modes[:, index]))
         axes.set_title(f"mode {mode}, {self.frequencies[index]:.4g} Hz")
+        if path is not None:
+            from carillon.files.atomic import atomic_path
+
+            with atomic_path(path) as temporary:
+                try:
+                    figure.savefig(temporary)
+                except ValueError as error:  # an ending of no kind of picture
+                    raise UserError(f"{path}: not written ({error})") from None
         return figure
 
     def save(self, path: str | Path) -> None:
@@ -530,6 +587,16 @@ class Solution:
 
         if self.solid is not None:
             write_all_modes(path, StreamedModes.of_contents(self._file()))
+
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
+        """Mesh, moduli and modes for PyVista: vectors `mode 1` and so on at the points.
+
+        Of finite cells it has the voxels with material. Raises UserError if PyVista is not
+        installed.
+        """
+        from solver.exchange.modes_pyvista import modes_grid
+
+        return modes_grid(self._file())
 
     def _file(self) -> ModesFile:
         from solver.files.modes_file import ModesFile

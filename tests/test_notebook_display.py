@@ -254,6 +254,29 @@ def test_nothing_is_loaded_before_it_is_shown():
     assert after & drawn == {"carillon.notebook.solid"}
 
 
+def test_pyvista_that_is_missing_is_named_with_what_installs_it(solution, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyvista", None)
+    for call in (
+        lambda: solution.plot(7, by="pyvista"),
+        solution.to_pyvista,
+        ca.load_mesh("builtin:bar").to_pyvista,
+    ):
+        with pytest.raises(ca.UserError) as caught:
+            call()
+        assert str(caught.value).endswith("pip install -r workflow/envs/requirements-vtk.txt")
+
+
+def test_a_picture_is_shown_and_written_without_pyplot(solution, tmp_path):
+    figure = solution.plot(7, tmp_path / "bar.png")
+    png = b"\x89PNG\r\n\x1a\n"
+    assert figure._repr_png_()[:8] == (tmp_path / "bar.png").read_bytes()[:8] == png
+    with pytest.raises(ca.UserError, match="a.txt: not written"):
+        solution.plot(7, tmp_path / "a.txt")
+    assert [each.name for each in tmp_path.iterdir()] == ["bar.png"]
+    with pytest.raises(ca.UserError, match="by: found 'vtk', expected 'matplotlib' or 'pyvista'"):
+        solution.plot(7, by="vtk")
+
+
 def test_sounds_are_read_and_written(tmp_path):
     tone = ca.Sound(0.5 * np.sin(2.0 * np.pi * 997.0 * np.arange(48_000) / 48_000), 48_000)
     tone.save(tmp_path / "tone.wav")

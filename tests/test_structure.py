@@ -46,7 +46,7 @@ ARROWS = {
     "carillon.command_line": """carillon carillon.files carillon.parameters carillon.processes
         carillon.records""",
     "carillon.fem.geometry": "carillon carillon.command_line carillon.files carillon.parameters",
-    "carillon.drawing": "carillon.fem.geometry",
+    "carillon.drawing": "carillon carillon.fem.geometry carillon.files",
     "carillon.notebook": "carillon carillon.drawing carillon.fem.geometry",
     "carillon.fem": """carillon carillon.fem.geometry carillon.files carillon.notebook
         carillon.processes""",
