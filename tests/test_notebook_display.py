@@ -20,6 +20,7 @@ from carillon.notebook.solid import _program as viewer_program
 from carillon.notebook.solid import solid
 from carillon.notebook.triangles import MOST_TRIANGLES, STEPS, Triangles
 from sound.levels import dithered
+from tests.notebooks import HEAD
 from tests.programs import CHECKOUT, python
 from tests.small_design import small_design
 
@@ -294,10 +295,7 @@ def page(objects, tmp_path_factory):
     """A page with all that is shown, in a file."""
     path = tmp_path_factory.mktemp("page") / "page.html"
     parts = "".join(shown._repr_html_() for shown in objects.values())
-    head = (
-        '<!doctype html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-    )
-    path.write_text(f"{head}<body>{parts}</body>", encoding="utf-8")
+    path.write_text(f"{HEAD}{parts}</body></html>", encoding="utf-8")
     return path
 
 

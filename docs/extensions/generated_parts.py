@@ -6,6 +6,7 @@ from typing import Any
 
 import command_help
 import gallery
+import notebooks
 import rooms_picture
 import schema_keys
 from places import PLACE
@@ -20,6 +21,7 @@ PARTS: dict[str, Callable[..., str]] = {
     "project": schema_keys.of_project,
     "scene": schema_keys.of_scene,
     "examples": gallery.of_examples,
+    "notebook": notebooks.of_notebook,
     "materials": schema_keys.of_materials,
 }
 
