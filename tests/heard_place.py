@@ -3,7 +3,8 @@
     python -m tests.heard_place [SOLID] [--clip CLIP] [--seconds S] [--radiation boundary-elements]
 
 Two designs are sought for one clip on a built-in solid: one as others are, whose amplitudes are
-those of the struck point, and one for a place 60 degrees above the horizon.  Printed is, for both,
+those of the struck point, and one for a place 60 degrees above the horizon.  The clip is what the
+solid would be heard like there if it were of another material, unless another one is named.  Printed is, for both,
 how far amplitudes are from the clip's, as they are struck, at that place, and at others: E_a of the
 cost (Eq. 2) on the fine solid, and rms [dB] of the partials less than 20 dB below the loudest.
 Then the gradient of the heard amplitudes is compared with central differences.  Boundary elements
@@ -12,6 +13,7 @@ take some minutes a place.
 
 import argparse
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +21,11 @@ import numpy as np
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.processes.threads import one_thread
-from sound.__main__ import main as sound_main
+from solver.files.modes_file import frequencies
+from sound.clips.targets import Targets
 from sound.design.optimise import optimise
 from sound.design.preparation import DesignProblem, prepare
-from sound.project.project import project_of
+from sound.project.project import Project, project_of
 
 PLACES = {
     "there": (0.5, 0.0, 0.866),
@@ -35,27 +38,44 @@ AWAY = 2.0
 """Distance [m] of the places."""
 STEP = 1e-5
 """Step of the central differences."""
+MODES, LOWEST, HIGHEST = 12, 1000.0, 8000.0
+"""Modes of the other material, their lowest frequency [Hz], and about their highest."""
 LOUD = 0.1
 """Amplitude of a partial over the loudest below which its level is not compared."""
 
 
 def problems(options: argparse.Namespace, folder: Path) -> dict[str, DesignProblem]:
     """The search as it is struck, and those for the places."""
-    wav = folder / "clip.wav"
-    if Path(options.clip).is_file():
-        wav = Path(options.clip).resolve()
-    elif sound_main(["clip", options.clip, "--seconds", "1.5", "--out", str(wav)]):
-        raise SystemExit(1)
+    clip = options.clip or folder / "nothing.wav"
+    if not options.clip:
+        clip.touch()
     described = {
         "mesh": f"builtin:{options.solid}",
-        "targets": [{"name": "strike", "clip": str(wav), "vertex": options.vertex}],
+        "modes": "auto" if options.clip else MODES,
+        "targets": [{"name": "strike", "clip": str(clip), "vertex": options.vertex}],
         "optimiser": {"seconds": options.seconds, "workers": 1},
     }
-    found = {"struck": prepare(project_of(described, folder))}
+    projects = {"struck": project_of(described, folder)}
     for name, way in PLACES.items():
         listen = {"at": [AWAY * each for each in way], "radiation": options.radiation}
-        found[name] = prepare(project_of({**described, "listen": listen}, folder))
-    return found
+        projects[name] = project_of({**described, "listen": listen}, folder)
+    targets = None if options.clip else heard_targets(projects["there"])
+    return {name: prepare(project, targets) for name, project in projects.items()}
+
+
+def heard_targets(project: Project) -> Targets:
+    """What the solid of a random material is heard like at the place of a project."""
+    hertz, amplitudes = np.geomspace(LOWEST, HIGHEST, MODES), np.ones((1, MODES))
+    some = Targets(("clip",), hertz, np.full(MODES, 5.0), amplitudes, (np.zeros(1),), (44_100,))
+    for _ in range(2):  # The band follows from the frequencies.
+        setting = prepare(project, some).setting
+        z = 0.5 * np.random.default_rng(1).standard_normal(setting.material.dimensions)
+        with one_thread():
+            at = setting.fine().simulation(1e-9).evaluate(z)
+        hertz = frequencies(at.eigenvalues)
+        balance = setting.objective.balance(at.eigenvalues, at.pushed)
+        some = replace(some, frequencies=hertz * LOWEST / hertz[0], amplitudes=balance)
+    return some
 
 
 def off(problem: DesignProblem, z: Array) -> str:
@@ -98,7 +118,7 @@ def gradient_error(problem: DesignProblem) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.heard_place")
     parser.add_argument("solid", nargs="?", default="bar", metavar="SOLID")
-    parser.add_argument("--clip", default="wood", help="an instrument, or a sound file")
+    parser.add_argument("--clip", help="a sound file in place of another material")
     parser.add_argument("--vertex", type=int, default=0, help="that is struck")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each search")
     parser.add_argument("--radiation", default="sphere")
@@ -110,7 +130,7 @@ def main() -> None:
     except UserError as error:
         parser.exit(1, f"{error}\n")
     print(
-        f"{'heard':>10} {'designed as struck':>20} {'for the place':>20}   E_a, rms of loud partials"
+        f"{'heard':>10} {'designed as struck':>20} {'for the place':>20}   E_a, loud partials rms"
     )
     for name, problem in each.items():
         # All searches have the same coordinates.

@@ -73,6 +73,17 @@ def summarise(design: Design) -> dict[str, Any]:
     }
 
 
+def _distance_sentence(verdict: dict[str, Any] | None) -> list[str]:
+    """How far sounds are from their clips, with all their levels."""
+    if not verdict or not verdict.get("likeness"):
+        return []
+    worst = max(verdict["likeness"], key=lambda each: each["distance_db"])
+    return [
+        f"levels over time and frequency {worst['distance_db']:.1f} dB (rms) from the clip's; "
+        f"silence would be {worst['silence_db']:.1f}"
+    ]
+
+
 def _place_sentence(listen: dict[str, Any] | None) -> list[str]:
     if listen is None:
         return []
@@ -124,6 +135,7 @@ def sentences(out: Path, design: Design, summary: dict[str, Any]) -> str:
             *_place_sentence(summary["listen"]),
             _damping_sentence(summary),
             *_build_sentences(summary["build"]),
+            *_distance_sentence(summary["verdict"]),
             *([summary["verdict"]["sentence"]] if summary["verdict"] else []),
             f"design: {out}; solid {lengths_in_words(summary['extents_m'])}",
         ]

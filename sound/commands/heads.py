@@ -139,7 +139,9 @@ def _weights(space: HeadSpace, blended: BlendOptions) -> tuple[Array, str]:
         except ValueError:
             raise UserError(f"--mix {each}: {value!r} is no number, expected NAME=WEIGHT") from None
     if not (np.isfinite(weights).all() and weights.sum() > 0.0):
-        raise UserError(f"--mix: weights of sum {weights.sum():g}, expected more than 0")
+        raise UserError(
+            f"--mix: weights of sum {weights.sum():g}, expected more than 0; give numbers"
+        )
     return weights / weights.sum(), f"with {', '.join(blended.mix)}"
 
 

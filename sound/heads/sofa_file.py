@@ -245,7 +245,10 @@ def _numbers(path: Path, file: h5py.File, name: str) -> Array:
     values = np.asarray(dataset[()], dtype=np.float64)
     if not np.isfinite(values).all():
         wrong = int(np.count_nonzero(~np.isfinite(values)))
-        raise UserError(f"{path}: {name} holds {wrong:,} values that are not finite")
+        raise UserError(
+            f"{path}: {name} holds {wrong:,} values that are not finite, expected numbers; name "
+            "another file"
+        )
     return values
 
 

@@ -86,6 +86,10 @@ class ListenSettings:
         "boundary-elements as it is, which takes minutes once a mesh, and needs bempp-cl",
     )
 
+    def __post_init__(self) -> None:
+        if self.at is None and self.radiation != "sphere":
+            raise ValueError(f"found radiation {self.radiation} without at, expected a place")
+
     def place(self, unit: float) -> FarPlace | None:
         """The place in the coordinates of a solid whose mesh has a unit [m]; None without one."""
         if self.at is None:

@@ -32,7 +32,9 @@ MUCH = 0.2
 """Share of the loudness in partials without a mode, beyond which this is told first."""
 CLIPS_DAMPINGS = "take the dampings of the clips (damping: {source: clips})"
 ANOTHER_SOLID = "take another solid"
-OTHER_MATERIALS = "name other materials below build, or let its cubes be smaller"
+OTHER_MATERIALS = (
+    "name other materials below build, let its cubes be smaller, or its size be free (size: free)"
+)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Integers, Surface
+from carillon.command_line.progress import say
 from carillon.composition.materials import NamedMaterial
 from carillon.errors import UserError
 from carillon.fem.geometry.hints import MeshHints
@@ -127,6 +128,12 @@ def _in_metres(entry: ObjectEntry, mesh: str, size: float) -> ObjectEntry:
 def _of_design(entry: ObjectEntry, path: str) -> ObjectSolid:
     design = read_design(_of_kind(path, "design"))
     sounding = SoundingSolid.of_design(design)
+    if design.place is not None:
+        at = ", ".join(f"{each:g}" for each in design.place.at)
+        say(
+            f"{entry.name!r} is designed for a listener towards ({at}) m in the axes of its mesh, "
+            "and sounds otherwise elsewhere"
+        )
     vertices = design.surface_vertices
     touched = touched_in_file(entry, path, design.model, vertices)
     return ObjectSolid(
