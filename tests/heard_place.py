@@ -4,9 +4,10 @@
 
 Two designs are sought for one clip on a built-in solid: one as others are, whose amplitudes are
 those of the struck point, and one for a place 60 degrees above the horizon.  The clip is what the
-solid would be heard like there if it were of another material, unless another one is named.  Printed is, for both,
-how far amplitudes are from the clip's, as they are struck, at that place, and at others: E_a of the
-cost (Eq. 2) on the fine solid, and rms [dB] of the partials less than 20 dB below the loudest.
+solid would be heard like there if it were of another material, unless another one is named.
+Printed is, for both, how far amplitudes are from the clip's, as they are struck, at that place, and
+at others: E_a of the cost (Eq. 2) on the fine solid, and rms [dB] of the partials less than 20 dB
+below the loudest.
 Then the gradient of the heard amplitudes is compared with central differences.  Boundary elements
 take some minutes a place.
 """
