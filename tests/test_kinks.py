@@ -13,6 +13,7 @@ from carillon.fem.finite_cells.build import covering
 from carillon.fem.finite_cells.kinks import Borders
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import builtin_surface
+from carillon.fem.model import mass_properties
 from carillon.fem.regions import Regions
 from studies.accuracy.solids import ANGLES
 from tests.cut_solids import divided
@@ -65,6 +66,16 @@ def test_a_rod_of_two_materials_is_as_its_equation_says():
     assert errors[1][0] < 2e-3
     assert errors[1][0] < errors[0][0] / 3.0
     assert errors[1][0] < errors[1][1] / 10.0
+
+
+def test_all_cells_may_be_of_two_materials():
+    """As those of a solid of small parts on a coarse lattice."""
+    inner = 0.45
+    parts = [(STIFF, Everywhere()), (SOFT, Expression(f"abs(z) > {inner * SIDE / 2}"))]
+    model = solid(parts, "finite-cell", ROD, 4)
+    assert set(model.shared.portion) == set(range(len(model.cells.cell)))
+    density = inner * STIFF.density[0] + (1.0 - inner) * SOFT.density[0]
+    assert mass_properties(model).mass == pytest.approx(density * LENGTH * SIDE**2, rel=1e-6)
 
 
 def test_there_is_no_kink_without_a_jump():

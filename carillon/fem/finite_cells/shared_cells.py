@@ -68,8 +68,9 @@ def point_values(
         order = np.arange(len(key))
         parts = sp.csr_matrix((of_part, (key, order)), (law.size, len(key)))
         values += np.asarray(parts @ shared.weights)
-        volume += np.bincount(key, share, minlength=law.size)
-        total += np.bincount(key, of_part * share, minlength=law.size)
+        # Not in place: counts of nothing, where all parts are shared, are whole numbers.
+        volume = volume + np.bincount(key, share, minlength=law.size)
+        total = total + np.bincount(key, of_part * share, minlength=law.size)
     volume, total = volume.reshape(law.shape), total.reshape(law.shape)
     values = values.reshape(*law.shape, -1)
     main = volume.argmax(axis=1)
