@@ -20,7 +20,8 @@ from sound.export.modal_model import ModalModel
 from sound.project.design import Design
 from sound.project.design_file import read_design, write_design
 from sound.project.project import project_of
-from sound.radiation.place import FarPlace, transfer_to
+from sound.radiation.far_place import FarPlace
+from sound.radiation.place import transfer_to
 from sound.radiation.plane_waves import AGREED, adapted
 from sound.radiation.sphere import (
     radiated,

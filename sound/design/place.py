@@ -1,12 +1,32 @@
-"""The place where a design is heard: the transfer to it, of a project and of a finished design."""
+"""The place where a design is heard: the transfer to it, of a search and of a finished design."""
 
 from dataclasses import replace
 
-from carillon.fem.model import mass_properties
+import numpy as np
+
+from carillon.arrays import Array, Integers
+from carillon.fem.model import Solid, mass_properties
 from sound.project.design import Design
+from sound.radiation.far_place import FarPlace
 from sound.radiation.place import transfer_to
 from sound.radiation.transfer import Transfer
 from sound.shape import Shape
+
+
+def place_transfer(
+    place: FarPlace,
+    model: Solid,
+    surface: tuple[Array, Integers],
+    hertz: Array,
+    name: str,
+) -> Transfer:
+    """Transfer to a place from a solid with a surface of vertices (V, 3) [m] and faces (F, 3).
+
+    It is for frequencies (N,) [Hz]; `sound.radiation.place.transfer_to` has the errors.
+    """
+    centre = mass_properties(model).centre
+    shape = Shape.of_surface(*surface, centre)
+    return transfer_to(place, shape, centre, (float(hertz.min()), float(hertz.max())), name)
 
 
 def with_pressures(design: Design, transfer: Transfer | None) -> Design:
@@ -30,7 +50,6 @@ def transfer_of(design: Design) -> Transfer:
     """
     place = design.place
     assert place is not None
-    centre = mass_properties(design.model).centre
-    shape = Shape.of_surface(design.surface_vertices, design.surface_faces, centre)
-    hertz = [*design.frequencies, *design.targets.frequencies]
-    return transfer_to(place, shape, centre, (float(min(hertz)), float(max(hertz))), design.name)
+    surface = design.surface_vertices, design.surface_faces
+    hertz = np.concatenate([design.frequencies, design.targets.frequencies])
+    return place_transfer(place, design.model, surface, hertz, design.name)

@@ -17,7 +17,7 @@ from carillon.fem.elasticity import Elasticity
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.model import finite_cell_model
 from carillon.fem.geometry import HexMesh
-from carillon.fem.model import fine_model, mass_properties
+from carillon.fem.model import fine_model
 from carillon.fem.regions import Regions
 from carillon.fem.supports import Supports
 from carillon.processes.threads import allowed_cores, one_thread
@@ -32,13 +32,12 @@ from sound.design.constants import NOTHING, FreeConstants, free_density, free_po
 from sound.design.elements import analysed_elements, coarsening_of
 from sound.design.material import ReducedMaterial
 from sound.design.objective import Objective
+from sound.design.place import place_transfer
 from sound.design.tasks import Setting
 from sound.project.design import Design
 from sound.project.project import Project
 from sound.project.settings import MaterialSettings
-from sound.radiation.place import require_far, transfer_to
 from sound.radiation.transfer import Transfer
-from sound.shape import Shape
 from sound.strikes import Strike
 
 MODES = 40
@@ -180,7 +179,7 @@ def prepare(
         strikes = usable_strikes(project, surface)
         place = project.listen.place(project.unit)
         if place is not None:
-            require_far(place, np.asarray(surface.vertices))
+            place.require_far(np.asarray(surface.vertices))
         sought = targets_of(project)
     else:
         strikes, sought = project.strikes(surface), targets
@@ -204,10 +203,8 @@ def _transfer(project: Project, solid: PreparedSolid, targets: Targets) -> Trans
     elements = analysed_elements(
         solid.mesh, project.solid, solid.cells, solid.placed, solid.supports
     )
-    centre = mass_properties(elements.model).centre
-    shape = Shape.of_surface(np.asarray(surface.vertices), np.asarray(surface.faces), centre)
-    hertz = float(targets.frequencies[0]), float(targets.frequencies[-1])
-    return transfer_to(place, shape, centre, hertz, project.mesh)
+    triangles = np.asarray(surface.vertices), np.asarray(surface.faces)
+    return place_transfer(place, elements.model, triangles, targets.frequencies, project.mesh)
 
 
 def _spectrum(project: Project, solid: PreparedSolid, strikes: Sequence[Strike]) -> SolidSpectrum:

@@ -20,7 +20,7 @@ from carillon.parameters.quantities import UP_AXES
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.project.build_evidence import is_build, is_number
-from sound.radiation.place import FarPlace
+from sound.radiation.far_place import RADIATIONS, FarPlace
 from sound.strikes import Strike
 
 HISTORY = {
@@ -125,9 +125,7 @@ class Design:
     def place(self) -> FarPlace | None:
         """The place where it is heard; None if its amplitudes are those of the struck points."""
         listen = self.settings.get("listen", {})
-        by_elements = listen.get("radiation") == "boundary-elements"
-        at = listen.get("at")
-        return None if at is None else FarPlace(self.unit * np.array(at, dtype=float), by_elements)
+        return FarPlace.of(listen.get("at"), self.unit, listen.get("radiation", RADIATIONS[0]))
 
     @property
     def wall(self) -> WallSize | None:

@@ -2,8 +2,6 @@
 
 from typing import Annotated
 
-import numpy as np
-
 from carillon.parameters import REQUIRED, Check, OneOf, Within, option, parameters
 from carillon.parameters.quantities import (
     Density,
@@ -16,7 +14,7 @@ from carillon.parameters.quantities import (
     between,
 )
 from sound.clips.formats import CLIP_FORMATS
-from sound.radiation.place import FarPlace
+from sound.radiation.far_place import RADIATIONS, FarPlace
 
 LEAST_WEIGHT = 1e-12
 """Weight of frequencies or of amplitudes below which a search has nothing to lower."""
@@ -29,7 +27,7 @@ def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
 
 
 ModeCount = Annotated[int, between(1, 10_000)]
-PlaceRadiation = Annotated[str, OneOf("sphere", "boundary-elements")]
+PlaceRadiation = Annotated[str, OneOf(*RADIATIONS)]
 Dampings = Annotated[str, OneOf("clips", "material")]
 """Where dampings of a design come from."""
 OptimiserMethod = Annotated[str, OneOf("hybrid", "cma", "bfgs")]
@@ -81,20 +79,18 @@ class ListenSettings:
         "Amplitudes are those of the motion at the struck points if null [mesh unit]",
     )
     radiation: PlaceRadiation = option(
-        "sphere",
+        RADIATIONS[0],
         "how the surface moves the air: as one of a sphere of its size does, or by "
         "boundary-elements as it is, which takes minutes once a mesh, and needs bempp-cl",
     )
 
     def __post_init__(self) -> None:
-        if self.at is None and self.radiation != "sphere":
+        if self.at is None and self.radiation != RADIATIONS[0]:
             raise ValueError(f"found radiation {self.radiation} without at, expected a place")
 
     def place(self, unit: float) -> FarPlace | None:
         """The place in the coordinates of a solid whose mesh has a unit [m]; None without one."""
-        if self.at is None:
-            return None
-        return FarPlace(unit * np.array(self.at), self.radiation == "boundary-elements")
+        return FarPlace.of(self.at, unit, self.radiation)
 
 
 @parameters

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from carillon.arrays import Array, Complex
 from carillon.command_line.progress import say
-from carillon.errors import UserError
 from sound.radiation.air import SOUND_SPEED
 from sound.radiation.boundary_mesh import BoundaryMesh
+from sound.radiation.far_place import FarPlace
 from sound.radiation.modes_directivity import resolved_mesh
 from sound.radiation.plane_waves import SolvedWaves
 from sound.radiation.sphere import SurfacePoints, sphere_fields, surface_points
 from sound.radiation.transfer import Transfer
 from sound.shape import Shape
 
-NEAREST = 2.0
-"""Least distance of a place from the middle of a solid, over that of its farthest point."""
 BELOW, BEYOND = 0.5, 1.15
 """Lowest and highest frequency of a transfer, over those that it is for."""
 STEP, TURN = 0.05, 0.8
@@ -26,15 +22,6 @@ STEP, TURN = 0.05, 0.8
 [rad] between them, of a wave over the radius of the solid."""
 FIRST_STEP, FIRST_TURN = 0.2, 2.4
 """The same of frequencies where boundary elements are solved first; between these where needed."""
-
-
-@dataclass(frozen=True)
-class FarPlace:
-    """A place (3,) [m] in the coordinates of a solid where it is heard, and whether its surface
-    moves the air as that of a sphere does, or by boundary elements."""
-
-    at: Array
-    by_elements: bool = False
 
 
 def transfer_to(
@@ -47,7 +34,7 @@ def transfer_to(
     near, and if boundary elements are not installed or the surface, which has a `name` in messages,
     is open.
     """
-    require_far(place, shape.vertices + centre)
+    place.require_far(shape.vertices + centre)
     away = place.at - centre
     direction = away / np.linalg.norm(away)
     radius = float(np.linalg.norm(shape.vertices, axis=1).max())
@@ -59,19 +46,6 @@ def transfer_to(
         first = frequencies_between(*hertz, radius, FIRST_STEP, FIRST_TURN)
         surface, fields = _by_elements(shape, direction, band, first, name)
     return Transfer.of_fields(surface.points + centre, surface.outward, band, fields)
-
-
-def require_far(place: FarPlace, vertices: Array) -> None:
-    """Raise UserError if a place is near to a surface of vertices (V, 3) [m]."""
-    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    distance = float(np.linalg.norm(place.at - middle))
-    least = NEAREST * float(np.linalg.norm(vertices - middle, axis=1).max())
-    if distance < least:
-        raise UserError(
-            f"listen.at: lies {distance:.3g} m from the middle of the solid, expected at least "
-            f"{least:.3g} m, {NEAREST:g} times as far as the solid reaches, since sound is "
-            "computed as it is heard from far away; name a place in the same direction"
-        )
 
 
 def frequencies_between(
