@@ -14,7 +14,7 @@ from sound.radiation.sphere import radiated
 from sound.shape import Shape
 from sound.strikes import struck_surface
 from sound.synthesis.driven import Gains, ring
-from tests.radiation_bem import CHECKED, by_elements, sphere, sphere_pressure
+from tests.radiation_bem import CHECKED, VibratingSurface, by_elements, sphere, sphere_pressure
 from tests.radiation_bem import RADIUS as BALL_RADIUS
 from tests.scenes import strikes_alone
 
@@ -185,7 +185,7 @@ def test_a_turned_solid_has_a_turned_directivity():
     turn = Rotation.from_euler("xyz", [20.0, 50.0, 110.0], degrees=True).as_matrix()
     mesh = BoundaryMesh(ball.mesh.vertices @ turn.T, ball.mesh.faces)
     motion = np.einsum("ij,vjn->vin", turn, ball.motion)
-    turned = boundary_elements.radiated_by_elements(mesh, motion, ball.frequencies)
+    turned = by_elements(VibratingSurface(mesh, motion, ball.frequencies))
     directions, _ = even_directions(8)
     expected = by_elements(ball).towards(directions)
     assert turned.towards(directions @ turn.T) == pytest.approx(expected, rel=1e-3, abs=1e-3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,11 +12,11 @@ from carillon.command_line.counts import counted
 from carillon.command_line.progress import say, track
 from carillon.errors import UserError
 from carillon.files.cache import remembered
-from carillon.files.datasets import read
 from carillon.files.hdf5 import create_h5, open_h5
 from sound.radiation.air import SOUND_SPEED
 from sound.radiation.boundary_elements import radiated_by_elements, same_frequency
 from sound.radiation.boundary_mesh import BoundaryMesh, boundary_mesh
+from sound.radiation.cache_entries import get_complex, key_of, put_complex
 from sound.radiation.directivity import Directivity
 from sound.radiation.outer_surface import outer_faces
 from sound.radiation.sphere import radiated
@@ -67,16 +66,14 @@ def modes_directivity(
     if not count:
         return sphere()
     moved, low = motion(mesh.middles)[:, :, :count], frequencies[:count]
-    key = hashlib.sha256(repr((_VERSION, FEWEST_EDGES_PER_WAVE)).encode())
-    for values in (mesh.vertices, mesh.faces.astype(float), moved, low):
-        key.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    key = key_of((_VERSION, FEWEST_EDGES_PER_WAVE), mesh.vertices, mesh.faces, moved, low)
 
     def found() -> Directivity:
         label = f"radiation of {name!r}, {len(mesh.faces):,} triangles"
         groups = track(same_frequency(low), label, unit="frequencies")
         return radiated_by_elements(mesh, moved, low, groups)
 
-    solved = remembered("directivity", key.hexdigest(), found, _read, _write)
+    solved = remembered("directivity", key, found, _read, _write)
     return solved if count == len(frequencies) else solved.with_modes_after(sphere())
 
 
@@ -110,11 +107,9 @@ def _edge(mesh: BoundaryMesh) -> float:
 
 def _read(path: Path) -> Directivity:
     with open_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        real, imaginary = (read(file, part, (None, None)) for part in ("real", "imaginary"))
-        return Directivity(real + 1j * imaginary)
+        return Directivity(get_complex(file))
 
 
 def _write(path: Path, directivity: Directivity) -> None:
     with create_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        file["real"] = directivity.coefficients.real
-        file["imaginary"] = directivity.coefficients.imag
+        put_complex(file, directivity.coefficients)

@@ -7,7 +7,6 @@ solid.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from carillon.files.hdf5 import create_h5, open_h5
 from sound.radiation.air import SOUND_SPEED
 from sound.radiation.boundary_elements import BoundaryElements
 from sound.radiation.boundary_mesh import BoundaryMesh
+from sound.radiation.cache_entries import get_complex, key_of, put_complex
 
 LEAST_STEP = 0.01
 """Distance of frequencies, over the frequency, that is divided no more."""
@@ -50,9 +50,8 @@ class SolvedWaves:
 
         They are kept in the user's cache.  Raises UserError if bempp-cl is not installed.
         """
-        key = hashlib.sha256(repr((_VERSION, LEAST_STEP, AGREED)).encode())
-        for values in (mesh.vertices, mesh.faces.astype(float), direction, first):
-            key.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+        constants = _VERSION, LEAST_STEP, AGREED
+        key = key_of(constants, mesh.vertices, mesh.faces, direction, first)
 
         def found() -> tuple[Array, Complex]:
             elements = BoundaryElements(mesh)
@@ -65,7 +64,7 @@ class SolvedWaves:
 
             return adapted(solve, first)
 
-        return cls(mesh, direction, *remembered("fields", key.hexdigest(), found, _read, _write))
+        return cls(mesh, direction, *remembered("fields", key, found, _read, _write))
 
     def at(self, hertz: Array) -> Complex:
         """Fields (N, V) at frequencies (N,) [Hz] between the solved ones."""
@@ -105,12 +104,10 @@ def adapted(solve: Callable[[Array], Complex], first: Array) -> tuple[Array, Com
 
 def _read(path: Path) -> tuple[Array, Complex]:
     with open_h5(path, _KIND, _SCHEMA, sealed=True) as file:
-        hertz = read(file, "hertz", (None,))
-        real, imaginary = (read(file, part, (None, None)) for part in ("real", "imaginary"))
-        return hertz, np.asarray(real + 1j * imaginary)
+        return read(file, "hertz", (None,)), get_complex(file)
 
 
 def _write(path: Path, waves: tuple[Array, Complex]) -> None:
     with create_h5(path, _KIND, _SCHEMA, sealed=True) as file:
         file["hertz"], smooth = waves
-        file["real"], file["imaginary"] = smooth.real, smooth.imag
+        put_complex(file, smooth)

@@ -23,7 +23,7 @@ import numba
 import numpy as np
 from scipy.special import spherical_jn, spherical_yn
 
-from carillon.arrays import Array, Complex
+from carillon.arrays import Array, Complex, Integers
 from sound.radiation.air import AIR_DENSITY, SOUND_SPEED
 from sound.radiation.directivity import Directivity, even_directions, harmonics, order_of
 from sound.radiation.outer_surface import outer_faces
@@ -67,17 +67,18 @@ class Radiation:
 
 
 @dataclass(frozen=True)
-class _Panels:
-    """Triangles that move: centres (F, 3) [m] from the solid's centre of mass, outward unit normals
-    (F, 3), areas (F,) [m^2], flows (F, N) [m^2 kg^-1/2], the normal displacement in each mode times
-    area, and the radius [m] of the sphere with as large a surface.
-    """
+class SurfacePoints:
+    """Points (P, 3) [m] of a surface from the centre of mass, outward unit normals (P, 3), and the
+    areas (P,) [m^2] that they stand for."""
 
-    centres: Array
-    normals: Array
+    points: Array
+    outward: Array
     areas: Array
-    flows: Array
-    radius: float
+
+    @property
+    def radius(self) -> float:
+        """Radius [m] of the sphere with as large a surface."""
+        return float(np.sqrt(self.areas.sum() / (4.0 * np.pi)))
 
 
 def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation:
@@ -103,13 +104,16 @@ def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation
     bowl and 6.6 dB for a wine glass, which amplify some modes by resonance of the air in them: the
     worst is 12 dB too soft (`python -m tests.radiation_bem bar plate bowl wine-glass`).
     """
-    panels = _panels(solid_motion, shape)
+    surface, faces = _outer_triangles(shape)
+    thirds = surface.areas / 3.0
+    flows = np.einsum("fcin,fi,f->fn", solid_motion[faces], surface.outward, thirds, optimize=True)
     numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
-    values, slopes = _hankel(numbers * panels.radius)
+    values, slopes = _hankel(numbers * surface.radius)
     scatter = -values / (numbers * slopes)
-    low = _low_orders(panels, numbers)
+    low = _low_orders(surface, flows, numbers)
     plain, turned = low.scattered(scatter[0], scatter[1])
-    rest = _power_above(panels, numbers, scatter[2], *low.scattered(scatter[2], scatter[2]))
+    above = low.scattered(scatter[2], scatter[2])
+    rest = _power_above(surface, flows, numbers, scatter[2], *above)
     dipole, beside = _main_axis(turned, 1.0 / slopes[1])
     monopole = np.sqrt(np.abs(plain) ** 2 + rest + (beside**2).sum(axis=1) / 3.0)
     # On a sphere order 0 has the phase of i / h_0', order 1 that of 1 / h_1'.
@@ -118,20 +122,9 @@ def radiated(solid_motion: Array, shape: Shape, frequencies: Array) -> Radiation
     return Radiation(pressure * np.where(inward, -monopole, monopole), pressure[:, None] * dipole)
 
 
-@dataclass(frozen=True)
-class SurfacePoints:
-    """Points (P, 3) [m] of a surface from the centre of mass, outward unit normals (P, 3), and the
-    areas (P,) [m^2] that they stand for."""
-
-    points: Array
-    outward: Array
-    areas: Array
-
-
 def surface_points(shape: Shape) -> SurfacePoints:
-    """The middles of a surface's triangles."""
-    panels = _panels(np.zeros((len(shape.vertices), 3, 0)), shape)
-    return SurfacePoints(panels.centres, panels.normals, panels.areas)
+    """The middles of a surface's triangles, but for those without area or of a cavity."""
+    return _outer_triangles(shape)[0]
 
 
 def sphere_fields(surface: SurfacePoints, direction: Array, hertz: Array) -> Complex:
@@ -140,11 +133,10 @@ def sphere_fields(surface: SurfacePoints, direction: Array, hertz: Array) -> Com
 
     As `radiated` has it, with the phases of all orders, as a single direction needs them.
     """
-    radius = float(np.sqrt(surface.areas.sum() / (4.0 * np.pi)))
     numbers = 2.0 * np.pi * hertz[:, None] / SOUND_SPEED
-    values, slopes = _hankel(numbers[:, 0] * radius)
+    values, slopes = _hankel(numbers[:, 0] * surface.radius)
     scatter = (-values / (numbers[:, 0] * slopes))[:, :, None]
-    away = np.linalg.norm(surface.points, axis=1).clip(AT_CENTRE * radius)
+    away = np.linalg.norm(surface.points, axis=1).clip(AT_CENTRE * surface.radius)
     steep = (surface.points * surface.outward).sum(axis=1) / away
     way, facing = surface.points @ direction, surface.outward @ direction
     one, two = (spherical_jn(order, numbers * away) for order in (1, 2))
@@ -168,15 +160,13 @@ def sphere_directivity(
     """
     surface = surface_points(shape)
     flows = np.einsum("fin,fi,f->fn", motion(surface.points), surface.outward, surface.areas)
-    radius = float(np.sqrt(surface.areas.sum() / (4.0 * np.pi)))
-    panels = _Panels(surface.points, surface.outward, surface.areas, flows, radius)
     numbers = 2.0 * np.pi * frequencies / SOUND_SPEED
-    values, slopes = _hankel(numbers * panels.radius)
+    values, slopes = _hankel(numbers * surface.radius)
     scatter = -values / (numbers * slopes)
-    low = _low_orders(panels, numbers)
+    low = _low_orders(surface, flows, numbers)
     order = order_of(float(numbers.max() * np.linalg.norm(shape.vertices, axis=1).max()))
     directions, shares = even_directions(2 * order)
-    ways, facings = directions @ panels.centres.T, directions @ panels.normals.T
+    ways, facings = directions @ surface.points.T, directions @ surface.outward.T
     flows = np.ascontiguousarray(flows)
     cosine, sine, steep_cosine, steep_sine = _waves(ways, facings, numbers, flows)
     heard = cosine - 1j * sine - numbers * scatter[2] * (1j * steep_cosine + steep_sine)
@@ -188,8 +178,8 @@ def sphere_directivity(
     return Directivity(-pressure[:, None] * np.conj(projected.T))
 
 
-def _panels(motion: Array, shape: Shape) -> _Panels:
-    """The triangles of a surface whose vertices move by (V, 3, N), none without area or of a
+def _outer_triangles(shape: Shape) -> tuple[SurfacePoints, Integers]:
+    """The middles of a surface's triangles, and their corners (P, 3), none without area or of a
     cavity."""
     outer = outer_faces(shape.vertices, shape.faces)
     corners = shape.vertices[outer]
@@ -200,9 +190,7 @@ def _panels(motion: Array, shape: Shape) -> _Panels:
     normals = doubled[there] / (2.0 * areas[:, None])
     outward = -shape.inward[faces].sum(axis=1)
     normals = np.where(((normals * outward).sum(axis=1) < 0.0)[:, None], -normals, normals)
-    flows = np.einsum("fcin,fi,f->fn", motion[faces], normals, areas / 3.0, optimize=True)
-    radius = float(np.sqrt(areas.sum() / (4.0 * np.pi)))
-    return _Panels(corners[there].mean(axis=1), normals, areas, flows, radius)
+    return SurfacePoints(corners[there].mean(axis=1), normals, areas), faces
 
 
 def _hankel(x: Array) -> tuple[Complex, Complex]:
@@ -236,23 +224,28 @@ class _LowOrders:
         )
 
 
-def _low_orders(panels: _Panels, numbers: Array) -> _LowOrders:
-    away = np.linalg.norm(panels.centres, axis=1).clip(AT_CENTRE * panels.radius)[:, None]
-    outward = panels.centres / away
-    steep = (outward * panels.normals).sum(axis=1)[:, None]
+def _low_orders(surface: SurfacePoints, flows: Array, numbers: Array) -> _LowOrders:
+    away = np.linalg.norm(surface.points, axis=1).clip(AT_CENTRE * surface.radius)[:, None]
+    outward = surface.points / away
+    steep = (outward * surface.outward).sum(axis=1)[:, None]
     zero, one, two = (spherical_jn(order, away * numbers) for order in range(3))
-    along = (panels.flows * one / away).T @ panels.normals
-    bent = (panels.flows * two * steep).T @ outward
+    along = (flows * one / away).T @ surface.outward
+    bent = (flows * two * steep).T @ outward
     return _LowOrders(
-        (panels.flows * zero).sum(axis=0),
-        -numbers * (panels.flows * steep * one).sum(axis=0),
-        -3j * ((panels.flows * one).T @ outward),
+        (flows * zero).sum(axis=0),
+        -numbers * (flows * steep * one).sum(axis=0),
+        -3j * ((flows * one).T @ outward),
         -3j * (along - numbers[:, None] * bent),
     )
 
 
 def _power_above(
-    panels: _Panels, numbers: Array, scatter: Complex, plain: Complex, turned: Complex
+    surface: SurfacePoints,
+    flows: Array,
+    numbers: Array,
+    scatter: Complex,
+    plain: Complex,
+    turned: Complex,
 ) -> Array:
     """Mean (N,) [m^4 kg^-1] over directions of |integral|^2, orders 0 and 1 taken off.
 
@@ -260,8 +253,8 @@ def _power_above(
     it.
     """
     directions = _half_of_all_directions(DIRECTION_PAIRS)
-    ways, facings = directions @ panels.centres.T, directions @ panels.normals.T
-    sums = _waves(ways, facings, numbers, np.ascontiguousarray(panels.flows))
+    ways, facings = directions @ surface.points.T, directions @ surface.outward.T
+    sums = _waves(ways, facings, numbers, np.ascontiguousarray(flows))
     cosine, sine, steep_cosine, steep_sine = sums
     # What is the same, and what is opposite, in the opposite direction.
     even = cosine - numbers * scatter * steep_sine - plain
@@ -271,9 +264,9 @@ def _power_above(
 
 @numba.njit(cache=True, nogil=True)
 def _waves(ways, facings, numbers, flows):  # type: ignore[no-untyped-def]
-    """Sums (4, d, N) over F panels of flows (F, N) times cosine and sine of k way, then so facing.
+    """Sums (4, d, N) over F triangles of flows (F, N) times cosine, sine of k way, then so facing.
 
-    `ways` (d, F) [m] and `facings` (d, F) tell how far the panels lie, and how much they face, in d
+    `ways` (d, F) [m] and `facings` (d, F) tell how far these lie, and how much they face, in d
     directions; `numbers` (N,) [1/m] are k.
     """
     sums = np.zeros((4, len(ways), len(numbers)))
