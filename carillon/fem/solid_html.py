@@ -1,4 +1,4 @@
-"""What a solid with material shows of itself in a notebook."""
+"""Display of a solid in a notebook, coloured by its moduli."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What objects show of themselves in a notebook: HTML that needs no network and no package."""
+"""Displays of objects in notebooks: HTML that needs no network and no package."""

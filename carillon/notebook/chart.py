@@ -22,7 +22,7 @@ MOST_STEMS = 300
 
 @dataclass(frozen=True)
 class Axis:
-    """What an axis shows, and its range."""
+    """Label of an axis, and its range."""
 
     label: str
     low: float

@@ -13,9 +13,9 @@ WIDTH, HEIGHT = 320, 240
 FINER = 2
 """Pixels that are computed for each that is kept, along a side."""
 ELEVATION, AZIMUTH = 22.0, -58.0
-"""Of the eye at first [degrees]."""
+"""Angles [degrees] at which the eye stands at first."""
 DISTANCE = 4.0
-"""Of the eye from the middle [radii]."""
+"""Distance of the eye from the middle of the solid [radii]."""
 ZOOM = 0.92
 """Half of the picture's height over the radius."""
 PLAIN = (230, 204, 163)

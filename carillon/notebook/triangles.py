@@ -43,7 +43,7 @@ class Triangles:
 
     @classmethod
     def of_surface(cls, vertices: Array, faces: Integers) -> Triangles:
-        """Those of vertices (v, 3) and triangles (t, 3) or quads (t, 4), in one colour."""
+        """Triangles of a surface of vertices (v, 3) and faces (t, 3) or (t, 4), in one colour."""
         corners = np.asarray(vertices)[faces]
         return cls.of_corners(corners)
 
@@ -54,7 +54,7 @@ class Triangles:
         values: Array | None = None,
         motions: Sequence[Array] = (),
     ) -> Triangles:
-        """Those of corners (f, 3 or 4, 3) of faces, values (f,) > 0 and motions (f, 3 or 4, 3)."""
+        """Triangles of faces by corners (f, 3 or 4, 3), values (f,) > 0, motions (f, 3 or 4, 3)."""
         sides = corners.shape[1]
         points = corners.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)

@@ -1,4 +1,4 @@
-"""What modes show of themselves in a notebook: frequencies, residuals, the solid as it moves."""
+"""Display of modes in a notebook: frequencies, residuals, the solid as it moves."""
 
 from typing import Any
 

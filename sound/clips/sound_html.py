@@ -1,4 +1,4 @@
-"""What sounds show of themselves in a notebook: a player, length, loudness, and their course."""
+"""Display of sounds in a notebook: a player, length, loudness, and their course."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sound.clips.extraction import ModalSound
 
 BITS = 16
-"""Of the samples that a page holds."""
+"""Bits of a sample that a page holds."""
 LONGEST_SECONDS = 20.0
 """Length [s] that a page holds of a sound, 2.4 MB at 44,100 Hz."""
 MOST_ROWS = 10
