@@ -66,9 +66,9 @@ from carillon.parameters.quantities import (
 if TYPE_CHECKING:
     import trimesh
     from matplotlib.figure import Figure
-    from mpi4py import MPI
     from scipy.sparse import csr_matrix
 
+    from carillon.processes.mpi import MPI
     from forests.model import Model
     from solver.files.modes_file import ModesFile
     from solver.verification.audit import Audit
@@ -549,8 +549,7 @@ def solve(
     >>> bool(held.frequencies[0] > 10.0)
     True
     """
-    from mpi4py import MPI
-
+    from carillon.processes.mpi import MPI
     from solver.analysis import library
     from solver.distribution.collective import compute_on_root
 

@@ -10,9 +10,8 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from mpi4py import MPI
-
 from carillon.command_line.progress import say
+from carillon.processes.mpi import MPI
 
 START = "start"
 """Phase from the start of the process until its clock is made: imports, and the start of MPI."""
