@@ -19,7 +19,7 @@ from solver.analysis.options import SolverOptions
 from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
 from solver.linear.factorisation import count_negative
-from solver.reference import eigensolver
+from solver.reference import slepc_lanczos
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from solver.verification.residuals import verify
 from tests import solids
@@ -123,8 +123,8 @@ def test_what_one_factorisation_refuses_the_next_does(monkeypatch):
     model, modes = SYMMETRIC[next(iter(SYMMETRIC))]
     system = system_of(model)
     expected = solve_truth(system, modes).values
-    packages = ["no such package", *eigensolver.definite_packages(1)]
-    monkeypatch.setattr(eigensolver, "definite_packages", lambda ranks: packages)
+    packages = ["no such package", *slepc_lanczos.definite_packages(1)]
+    monkeypatch.setattr(slepc_lanczos, "definite_packages", lambda ranks: packages)
     np.testing.assert_allclose(solve_truth(system, modes).values, expected, rtol=1e-9, atol=1e-3)
 
 

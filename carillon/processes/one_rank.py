@@ -85,13 +85,14 @@ class Comm:
         """Nothing to free."""
 
 
-class Request:
+class NoMessage:
     """A message under way, of which one rank has none."""
 
     @staticmethod
-    def Waitall(requests: Sequence[Request]) -> None:  # noqa: N802
+    def Waitall(requests: Sequence[NoMessage]) -> None:  # noqa: N802
         """Wait for messages: there are none."""
         assert not requests
 
 
+Request = NoMessage
 COMM_SELF = COMM_WORLD = Comm()
