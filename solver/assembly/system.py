@@ -29,9 +29,9 @@ from solver.distribution.local_mesh import LocalMesh
 
 Number = TypeVar("Number", np.float64, np.int64)
 
-if MPI.COMM_WORLD.size > 1:
-    # Both start on all ranks together, and one rank may come to need them alone. One process loads
-    # them when it needs them.
+if MPI.Is_initialized() and MPI.COMM_WORLD.size > 1:
+    # PETSc and SLEPc start on all ranks together, and one rank may come to need them alone. One
+    # process loads them when it needs them.
     cluster_packages.load()
 
 COLUMNS_GATHERED = 16
