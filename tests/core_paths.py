@@ -22,6 +22,8 @@ COMMANDS = (
     ("compare", "hcms.h5", "truth.h5"),
     ("audit", "truth.h5"),
     ("inspect-forests",),
+    ("generate", "--samples", "64", "--out", "shard.h5"),
+    ("train", "shard.h5", "--trees", "1", "--workers", "1", "--out", "forests.h5"),
 )
 CLUSTER = ("mpi4py", "petsc4py", "slepc4py")
 

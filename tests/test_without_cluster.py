@@ -1,4 +1,7 @@
-"""Without mpi4py, PETSc and SLEPc everything of one machine runs, and gives the same digits."""
+"""Without mpi4py, PETSc and SLEPc everything of one machine runs, and gives the same digits.
+
+The main paths do without what macOS lacks of Linux, too.
+"""
 
 import re
 import subprocess
@@ -16,7 +19,7 @@ from tests.core_paths import CLUSTER, SOLID
 from tests.programs import CHECKOUT, checkout_environment, python
 
 HIDE = f"""
-import sys
+import builtins, io, os, sys, time
 
 class Hidden:
     def find_spec(self, name, path=None, target=None):
@@ -24,6 +27,19 @@ class Hidden:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 
 sys.meta_path.insert(0, Hidden())
+
+# What Linux alone has: no other system is at hand to try this on.
+del os.sched_getaffinity, os.O_PATH, time.CLOCK_BOOTTIME
+
+def without_proc(opened):
+    def open(file, *arguments, **options):
+        # threadpoolctl reads the maps on Linux.
+        if str(file).startswith(("/proc/", "/sys/")) and str(file) != "/proc/self/maps":
+            raise FileNotFoundError(2, "No such file or directory", str(file))
+        return opened(file, *arguments, **options)
+    return open
+
+builtins.open = io.open = without_proc(io.open)
 """
 """Python runs this at its start where its folder is searched, in all processes of a program."""
 

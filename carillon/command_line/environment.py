@@ -67,6 +67,8 @@ def _print_table(description: dict[str, Any]) -> None:
         "BLAS": ", ".join(f"{user} {name}" for user, name in description["blas_by_user"].items()),
         "processor": f"{description['processor']}, {description['cores']} cores usable",
     }
+    if description["petsc"] is None:
+        del rows["solvers"]
     for name, text in rows.items():
         print(f"{name:<10} {text}")
 

@@ -4,16 +4,19 @@ On one machine everything but what is named here runs without them.  PETSc and S
 communicators from mpi4py, so that they count as installed with it alone.
 """
 
+import os
 from importlib import import_module
 from importlib.util import find_spec
 
 from carillon.errors import UserError, on_all_ranks
+from carillon.processes import rooms
 
 MPI, PETSC, SLEPC = "mpi4py", "petsc4py", "slepc4py"
 NEEDED = {MPI: (MPI,), PETSC: (MPI, PETSC), SLEPC: (MPI, PETSC, SLEPC)}
 """Packages that each of them needs, itself included."""
-INSTALL = "pip install 'carillon[cluster]' (docs/howto/install.md)"
-"""How they are installed, for messages."""
+_COMMAND = "pip install 'carillon[cluster]'" if os.path.isdir(rooms.INSTALLED) else "make env"
+INSTALL = f"run `{_COMMAND}` (docs/howto/environment.md)"
+"""How they are installed, beside an installation or in a checkout, for messages."""
 
 
 def is_installed(package: str) -> bool:
@@ -37,7 +40,7 @@ def require(package: str, what: str, instead: str) -> None:
     if missing:
         raise UserError(
             f"{what} needs {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} "
-            f"not installed: {INSTALL}, or {instead}"
+            f"not installed; {INSTALL}, or {instead}"
         )
 
 

@@ -31,6 +31,6 @@ else:
             cluster_packages.require(
                 cluster_packages.MPI,
                 f"a run on {ranks} ranks",
-                "start one process without mpiexec",
+                "start one process, without mpiexec",
             )
     from carillon.processes import one_rank as MPI  # noqa: N812
