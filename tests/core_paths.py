@@ -41,7 +41,7 @@ def run() -> None:
         resolution=16,
         coarsen="none",
         targets=[target],
-        optimiser={"evaluations": 2, "workers": 1},
+        optimiser={"evaluations": 4, "workers": 2},
     )
     for module in ("studio.server.serve", "studio.session.studio", "studio.processes.solid"):
         import_module(module)

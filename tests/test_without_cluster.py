@@ -40,6 +40,8 @@ def without_proc(opened):
     return open
 
 builtins.open = io.open = without_proc(io.open)
+isdir = os.path.isdir
+os.path.isdir = lambda path: isdir(path) and not str(path).startswith("/proc/")
 """
 """Python runs this at its start where its folder is searched, in all processes of a program."""
 
