@@ -17,16 +17,21 @@ from solver.files.modes_file import read_modes
 from solver.verification.audit import audit_files
 from tests.core_paths import CLUSTER, SOLID
 from tests.programs import CHECKOUT, checkout_environment, python
+from tests.rank_counts import TO_THREE
 
-HIDE = f"""
-import builtins, io, os, sys, time
+HIDE = """
+import sys
 
 class Hidden:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {CLUSTER}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+        if name.partition(".")[0] in PACKAGES:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Hidden())
+"""
+"""Python runs this at its start where its folder is searched, in all processes of a program."""
+HIDE_LINUX = """
+import builtins, io, os, time
 
 # What Linux alone has: no other system is at hand to try this on.
 del os.sched_getaffinity, os.O_PATH, time.CLOCK_BOOTTIME
@@ -43,14 +48,15 @@ builtins.open = io.open = without_proc(io.open)
 isdir = os.path.isdir
 os.path.isdir = lambda path: isdir(path) and not str(path).startswith("/proc/")
 """
-"""Python runs this at its start where its folder is searched, in all processes of a program."""
+"""Likewise."""
 
 
 @pytest.fixture(scope="module")
 def core(tmp_path_factory):
     """Function that runs a program in a folder, where the packages are hidden from it."""
     hidden = tmp_path_factory.mktemp("hidden")
-    (hidden / "sitecustomize.py").write_text(HIDE)
+    program = f"PACKAGES = {CLUSTER}\n{HIDE}{HIDE_LINUX}"
+    (hidden / "sitecustomize.py").write_text(program)
     path = f"{hidden}:{CHECKOUT}"
 
     def run(
@@ -121,6 +127,21 @@ def test_one_of_several_ranks_is_told_that_mpi4py_is_missing(variable, core):
         assert done.returncode != 0
         sentence = done.stderr.splitlines()[-1]
         assert "a run on 2 ranks needs mpi4py, which is not installed" in sentence
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", TO_THREE)
+def test_mpi4py_alone_is_enough_for_several_ranks(ranks, paths, tmp_path, mpiexec):
+    (tmp_path / "sitecustomize.py").write_text(f"PACKAGES = {CLUSTER[1:]}\n{HIDE}")
+    variables = {"PYTHONPATH": f"{tmp_path}:{CHECKOUT}"}
+    options = ("--tolerance", "1e-10", "--check-inertia", "--out", "modes.h5")
+    words = ("carillon", "modes", *SOLID, *options)
+    mpiexec(ranks, *words, cwd=tmp_path, env=variables, check=True)
+    values, expected = (
+        read_modes(str(folder / name)).eigenvalues[6:]
+        for folder, name in ((tmp_path, "modes.h5"), (paths, "auto.h5"))
+    )
+    assert np.abs(values / expected - 1.0).max() < 1e-9
 
 
 def test_mpi4py_that_cannot_be_loaded_is_told(tmp_path):

@@ -65,6 +65,10 @@ def smallest_eigenpairs(
 
         found = slepc_lanczos.smallest_eigenpairs(*given, method, configurable)
     else:
+        if system.comm.size > 1:
+            cluster_packages.require(
+                SLEPC, f"a search by ARPACK on {system.comm.size} ranks", "start one process"
+            )
         from solver.reference import scipy_arpack
 
         found = scipy_arpack.smallest_eigenpairs(*given)
