@@ -14,7 +14,7 @@ import solver.analysis.proof as proof
 import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import assemble
@@ -79,7 +79,7 @@ def method(request, monkeypatch):
     """A method of ground truth, one of them where neither SLEPc nor PETSc is installed."""
     if request.param in ("slepc", "arpack"):
         return request.param
-    monkeypatch.setattr(cluster_packages, "_is_found", lambda package: False)
+    monkeypatch.setattr(extras, "_is_found", lambda package: False)
     return "arpack"
 
 

@@ -12,7 +12,8 @@ import pytest
 from mpi4py import MPI
 
 from carillon.__main__ import main
-from carillon.processes import cluster_packages, one_rank
+from carillon.command_line import commands
+from carillon.processes import extras, one_rank
 from solver.files.modes_file import read_modes
 from solver.verification.audit import audit_files
 from tests.core_paths import CLUSTER, SOLID
@@ -94,7 +95,7 @@ def test_ground_truth_is_counted_by_the_own_factorisation(paths):
 def test_audits_agree(paths, monkeypatch):
     file = str(paths / "truth.h5")
     (of_petsc,) = audit_files([file], 1e-6).values()
-    monkeypatch.setattr(cluster_packages, "_is_found", lambda package: False)
+    monkeypatch.setattr(extras, "_is_found", lambda package: False)
     (own,) = audit_files([file], 1e-6).values()
     assert not own.faults and own.counted == of_petsc.counted == own.expected
     # Residuals are rounding here, and so are those in energy.
@@ -113,11 +114,27 @@ def test_audits_agree(paths, monkeypatch):
     ],
 )
 def test_what_needs_them_says_what_to_install(options, what, refuses, monkeypatch, tmp_path):
-    monkeypatch.setattr(cluster_packages, "_is_found", lambda package: False)
+    monkeypatch.setattr(extras, "_is_found", lambda package: False)
     out = tmp_path / "modes.h5"
     sentence = refuses(main, "modes", *SOLID, *options, "--out", out)
-    assert what in sentence and cluster_packages.INSTALL in sentence
+    assert what in sentence and extras.install() in sentence
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "command, package, extra",
+    [("study benchmark builtin:bar", "petsc4py", "cluster"), ("rules", "snakemake", "workflow")],
+)
+def test_commands_of_an_extra_say_what_to_install(
+    command, package, extra, refuses, monkeypatch, capsys
+):
+    def missing(arguments):
+        raise ModuleNotFoundError(f"No module named '{package}'", name=f"{package}.part")
+
+    monkeypatch.setattr(commands, "_module", lambda command: missing(command))
+    sentence = refuses(main, *command.split())
+    assert f"this needs {package}, which is not installed" in sentence
+    assert extras.install(extra) in sentence
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"])

@@ -4,8 +4,8 @@ import argparse
 import json
 from typing import Any
 
-from carillon.processes import blas, cluster_packages, threads
-from carillon.processes.cluster_packages import INSTALL, MPI, PETSC, SLEPC
+from carillon.processes import blas, extras, threads
+from carillon.processes.extras import MPI, PETSC, SLEPC
 from carillon.records import provenance
 
 
@@ -16,7 +16,7 @@ def describe() -> dict[str, Any]:
     """
     return {
         "versions": provenance.versions(),
-        **_cluster_packages(),
+        **_of_cluster(),
         "blas": blas.blas_name(),
         "blas_by_user": blas.blas_by_user(),
         "reference_blas": blas.is_reference_blas(),
@@ -25,21 +25,21 @@ def describe() -> dict[str, Any]:
     }
 
 
-def _cluster_packages() -> dict[str, Any]:
+def _of_cluster() -> dict[str, Any]:
     """Versions of MPI, PETSc and SLEPc, None of those not installed, and what these bring along."""
     found: dict[str, Any] = {"mpi": None, "petsc": None, "slepc": None}
     solvers = dict.fromkeys(("mumps", "cholmod", "arpack"), False)
-    if cluster_packages.is_installed(MPI):
+    if extras.is_installed(MPI):
         from carillon.processes.mpi import MPI as mpi  # noqa: N811
 
         found["mpi"] = mpi.Get_library_version().split(",")[0].strip("\0 \n")
-    if cluster_packages.is_installed(PETSC):
+    if extras.is_installed(PETSC):
         from carillon.processes.petsc import PETSc
 
         found["petsc"] = _dotted(PETSc.Sys.getVersion())
         solvers["mumps"] = bool(PETSc.Sys.hasExternalPackage("mumps"))
         solvers["cholmod"] = bool(PETSc.Sys.hasExternalPackage("suitesparse"))
-    if cluster_packages.is_installed(SLEPC):
+    if extras.is_installed(SLEPC):
         from carillon.processes.slepc import SLEPc
 
         found["slepc"] = _dotted(SLEPc.Sys.getVersion())
@@ -53,7 +53,7 @@ def _dotted(version: tuple[int, ...]) -> str:
 
 def _print_table(description: dict[str, Any]) -> None:
     versions = dict(description["versions"])
-    absent = f"not installed; {INSTALL}"
+    absent = f"not installed; {extras.install()}"
     rows = {
         "Carillon": f"{versions.pop('carillon')} on Python {versions.pop('python')}",
         "packages": ", ".join(f"{name} {version}" for name, version in versions.items()),

@@ -9,14 +9,14 @@ import os
 from typing import TYPE_CHECKING
 
 from carillon.errors import UserError, on_all_ranks, one_line
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 from carillon.processes.mpi_environment import started_ranks
 
 __all__ = ["MPI"]
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-elif cluster_packages.is_installed(cluster_packages.MPI):
+elif extras.is_installed(extras.MPI):
     try:
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:  # RuntimeError: its wheel finds no library
@@ -28,8 +28,8 @@ else:
     ranks = started_ranks(os.environ)
     if ranks > 1:
         with on_all_ranks():
-            cluster_packages.require(
-                cluster_packages.MPI,
+            extras.require(
+                extras.MPI,
                 f"a run on {ranks} ranks",
                 "start one process, without mpiexec",
             )

@@ -6,7 +6,7 @@ Only their ratios matter, which other processors and ranks change little.
 
 from math import log10
 
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 from solver.analysis.options import SolverOptions
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, default_guard
 from solver.linear.rank_tree import RankTree
@@ -37,7 +37,7 @@ def gradients_are_faster(
     It starts from random vectors, or from coarse modes. It is not without PETSc, whose multigrid it
     needs.
     """
-    if n_dofs < FEWEST_UNKNOWNS or not cluster_packages.is_installed(cluster_packages.PETSC):
+    if n_dofs < FEWEST_UNKNOWNS or not extras.is_installed(extras.PETSC):
         return False
     factor, solve = tree.operations()
     lanczos = FACTOR * factor + SOLVE * (SOLVES_A_MODE * options.modes + SOLVES) * solve

@@ -19,7 +19,7 @@ from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import rigid_motions
 from carillon.fem.elements import Elements
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 from carillon.processes.mpi import MPI
 from solver.assembly import narrow
 from solver.assembly.halo import Halo
@@ -32,7 +32,7 @@ Number = TypeVar("Number", np.float64, np.int64)
 if MPI.Is_initialized() and MPI.COMM_WORLD.size > 1:
     # PETSc and SLEPc start on all ranks together, and one rank may come to need them alone. One
     # process loads them when it needs them.
-    cluster_packages.load()
+    extras.load_cluster()
 
 COLUMNS_GATHERED = 16
 """Number of columns that travel to rank 0 together where a block is gathered or written."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import blas
 
 from carillon.arrays import Array, Index
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 from carillon.processes.mpi import MPI
 from solver.distribution.collective import receive_arrays, send_arrays
 from solver.hcms.counts import Tally, count_shared_eigenproblem
@@ -34,7 +34,7 @@ _PENCIL, _VECTORS = 21, 22
 
 def available() -> bool:
     """Whether PETSc is installed, with a ScaLAPACK that has what is needed here."""
-    if not cluster_packages.is_installed(cluster_packages.PETSC):
+    if not extras.is_installed(extras.PETSC):
         return False
     library = _library()
     return all(hasattr(library, name) for name in _ROUTINES)

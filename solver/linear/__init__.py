@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
-from carillon.processes import cluster_packages
-from carillon.processes.cluster_packages import PETSC
+from carillon.processes import extras
+from carillon.processes.extras import PETSC
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
@@ -138,7 +138,7 @@ class LinearSolver:
         """The method, which `auto` stands for; collective when first asked for."""
         if self._asked == "auto":
             # Without PETSc a factorisation is begun, which says how much memory it lacks.
-            if self.tree.fits(MEMORY_SHARE) or not cluster_packages.is_installed(PETSC):
+            if self.tree.fits(MEMORY_SHARE) or not extras.is_installed(PETSC):
                 return "multifrontal"
             return "amg-cg"
         if self._asked == "multifrontal":
@@ -192,4 +192,4 @@ def require_method(method: str, what: str = "") -> None:
         raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
     if method in OF_PETSC:
         what = what or f"--linear-solver {method}"
-        cluster_packages.require(PETSC, what, "leave it out: auto takes what is there")
+        extras.require(PETSC, what, "leave it out: auto takes what is there")

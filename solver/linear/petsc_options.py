@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from carillon.errors import UserError, on_all_ranks
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 
 if TYPE_CHECKING:
     from carillon.processes.petsc import PETSc
@@ -37,7 +37,7 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
     """
     if text is None and not _inserted:
         return
-    cluster_packages.require(cluster_packages.PETSC, "--petsc", "leave it out")
+    extras.require(extras.PETSC, "--petsc", "leave it out")
     from carillon.processes.petsc import PETSc
 
     for name in _inserted:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.processes import cluster_packages
-from carillon.processes.cluster_packages import SLEPC
+from carillon.processes import extras
+from carillon.processes.extras import SLEPC
 from solver.assembly.system import System
 
 KRYLOV_SCHUR, ARPACK = "slepc", "arpack"
@@ -14,13 +14,13 @@ TYPES = (KRYLOV_SCHUR, ARPACK)
 
 def installed_method() -> str:
     """Krylov-Schur where SLEPc is installed, ARPACK elsewhere."""
-    return KRYLOV_SCHUR if cluster_packages.is_installed(SLEPC) else ARPACK
+    return KRYLOV_SCHUR if extras.is_installed(SLEPC) else ARPACK
 
 
 def require_method(method: str) -> None:
     """Raise UserError unless a method is installed."""
     if method == KRYLOV_SCHUR:
-        cluster_packages.require(SLEPC, f"--method {method}", f"take --method {ARPACK}")
+        extras.require(SLEPC, f"--method {method}", f"take --method {ARPACK}")
 
 
 def smallest_eigenpairs(
@@ -60,13 +60,13 @@ def smallest_eigenpairs(
     """
     require_method(method)
     given = system, known, count, shift, start, tolerance
-    if cluster_packages.is_installed(SLEPC):
+    if extras.is_installed(SLEPC):
         from solver.reference import slepc_lanczos
 
         found = slepc_lanczos.smallest_eigenpairs(*given, method, configurable)
     else:
         if system.comm.size > 1:
-            cluster_packages.require(
+            extras.require(
                 SLEPC, f"a search by ARPACK on {system.comm.size} ranks", "start one process"
             )
         from solver.reference import scipy_arpack

@@ -7,8 +7,8 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
-from carillon.processes import cluster_packages
-from carillon.processes.cluster_packages import PETSC
+from carillon.processes import extras
+from carillon.processes.extras import PETSC
 from solver.assembly.system import System
 from solver.linear import LinearSolver
 from solver.reference.eigensolver import installed_method, smallest_eigenpairs
@@ -96,7 +96,7 @@ def can_count() -> bool:
 
     Where PETSc is not installed Carillon's own factorisation counts.
     """
-    if not cluster_packages.is_installed(PETSC):
+    if not extras.is_installed(PETSC):
         return True
     from carillon.processes.petsc import PETSc
 
@@ -117,7 +117,7 @@ def count_beyond(
 
 def count_below(system: System, value: float) -> int:
     """Eigenvalues of K - value M below zero, by inertia; see `can_count`; collective."""
-    if not cluster_packages.is_installed(PETSC):
+    if not extras.is_installed(PETSC):
         return LinearSolver("multifrontal", system.layout).count_below(system, value)
     from solver.linear.factorisation import count_negative
 

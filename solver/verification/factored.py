@@ -18,7 +18,7 @@ from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import Solid
-from carillon.processes import cluster_packages
+from carillon.processes import extras
 from carillon.processes.mpi import MPI
 from solver.assembly.system import System, assemble, distributed_matrix
 from solver.distribution.local_mesh import distribute
@@ -52,7 +52,7 @@ class Factored(ABC):
 
 def factored(model: Solid, K: csr_matrix, M: csr_matrix) -> Factored:
     """The matrices of a model, to be factorised by PETSc's packages where it is installed."""
-    if cluster_packages.is_installed(cluster_packages.PETSC):
+    if extras.is_installed(extras.PETSC):
         return _ByPetsc(K, M)
     return _ByFronts(model, K, M)
 
