@@ -68,9 +68,9 @@ if TYPE_CHECKING:
     import pyvista
     import trimesh
     from matplotlib.figure import Figure
-    from mpi4py import MPI
     from scipy.sparse import csr_matrix
 
+    from carillon.processes.mpi import MPI
     from forests.model import Model
     from solver.files.modes_file import ModesFile
     from solver.refinement.errors import ExpectedErrors
@@ -669,8 +669,7 @@ def solve(
     >>> bool(held.frequencies[0] > 10.0)
     True
     """
-    from mpi4py import MPI
-
+    from carillon.processes.mpi import MPI
     from solver.analysis import library
     from solver.distribution.collective import compute_on_root
 

@@ -1,11 +1,11 @@
 """Tasks shared among MPI ranks: each does every so-manieth, rank 0 writes all of them in order."""
 
 import logging
-import os
 from collections.abc import Callable, Generator
 
 from carillon.errors import UserError
 from carillon.processes.ranks import Comm
+from carillon.processes.threads import core_numbers
 from dataset_gen.generate import Engine
 from dataset_gen.tasks import ShardPlan
 
@@ -65,10 +65,10 @@ def _follow(comm: Comm) -> int:
 
 
 def _warn_about_cores(comm: Comm) -> None:
-    from mpi4py import MPI
+    from carillon.processes.mpi import MPI
 
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    cores = set[int]().union(*node.allgather(os.sched_getaffinity(0)))
+    cores = set[int]().union(*node.allgather(core_numbers()))
     if node.rank == 0 and node.size > len(cores):
         logger.warning(
             f"{node.size} ranks share {len(cores)} cores, more than that make nothing faster"

@@ -4,6 +4,8 @@ import resource
 import time
 from pathlib import Path
 
+from carillon.processes.memory import peak_memory
+
 ORIGINS = 8
 """Training rows of a sample: each corner of the block in turn is the origin."""
 
@@ -22,13 +24,8 @@ class Speed:
         text = (
             f"{samples:,} samples in {seconds:.1f} s, {rate:,.0f} samples/s = "
             f"{ORIGINS * rate:,.0f} training rows/s; {size:,.1f} MB, {size / seconds:,.1f} MB/s; "
-            f"peak memory {_peak(resource.RUSAGE_SELF):,.0f} MB"
+            f"peak memory {peak_memory() / 1e6:,.0f} MB"
         )
         if workers > 1:
-            text += f", of a worker {_peak(resource.RUSAGE_CHILDREN):,.0f} MB"
+            text += f", of a worker {peak_memory(resource.RUSAGE_CHILDREN) / 1e6:,.0f} MB"
         return text
-
-
-def _peak(who: int) -> float:
-    """Largest resident memory in MB of this process, or of the largest child that has ended."""
-    return resource.getrusage(who).ru_maxrss * 1024 / 1e6

@@ -14,12 +14,13 @@ import solver.analysis.proof as proof
 import solver.reference.truth as truth
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES
+from carillon.processes import extras
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
 from solver.linear.factorisation import count_negative
-from solver.reference import eigensolver
+from solver.reference import slepc_lanczos
 from solver.reference.truth import complete, count_beyond, solve_truth, start_vector
 from solver.verification.residuals import verify
 from tests import solids
@@ -28,6 +29,7 @@ from tests.rank_counts import TO_THREE
 COMM = MPI.COMM_SELF
 PROGRAM = Path(__file__).with_name("distributed_checks.py")
 SEEDS = range(20)
+METHODS = ["slepc", "arpack", "without SLEPc"]
 LOOSE = 1e-6
 """Residual at which a Krylov space has hardly seen the copies of multiple eigenvalues."""
 
@@ -73,6 +75,15 @@ def system_of(model):
 
 
 @pytest.fixture
+def method(request, monkeypatch):
+    """A method of ground truth, one of them where neither SLEPc nor PETSc is installed."""
+    if request.param in ("slepc", "arpack"):
+        return request.param
+    monkeypatch.setattr(extras, "_is_found", lambda package: False)
+    return "arpack"
+
+
+@pytest.fixture
 def lose(monkeypatch):
     """Make searches lose the pairs of these numbers: the first search alone, or all of them."""
 
@@ -93,7 +104,7 @@ def lose(monkeypatch):
     return plant
 
 
-@pytest.mark.parametrize("method", ["slepc", "arpack"])
+@pytest.mark.parametrize("method", METHODS, indirect=True)
 def test_ground_truth_equals_lapack_and_is_proven_complete(method):
     model = solids.random_box(8, 5, 4)
     exact = solids.dense_eigenvalues(model)[:50]
@@ -103,7 +114,7 @@ def test_ground_truth_equals_lapack_and_is_proven_complete(method):
     assert result.residuals.max() < 1e-8
 
 
-@pytest.mark.parametrize("method", ["slepc", "arpack"])
+@pytest.mark.parametrize("method", METHODS, indirect=True)
 @pytest.mark.parametrize("solid", SYMMETRIC)
 def test_nothing_is_missed_in_symmetric_solids(solid, method):
     model, modes = SYMMETRIC[solid]
@@ -123,12 +134,12 @@ def test_what_one_factorisation_refuses_the_next_does(monkeypatch):
     model, modes = SYMMETRIC[next(iter(SYMMETRIC))]
     system = system_of(model)
     expected = solve_truth(system, modes).values
-    packages = ["no such package", *eigensolver.definite_packages(1)]
-    monkeypatch.setattr(eigensolver, "definite_packages", lambda ranks: packages)
+    packages = ["no such package", *slepc_lanczos.definite_packages(1)]
+    monkeypatch.setattr(slepc_lanczos, "definite_packages", lambda ranks: packages)
     np.testing.assert_allclose(solve_truth(system, modes).values, expected, rtol=1e-9, atol=1e-3)
 
 
-@pytest.mark.parametrize("method", ["slepc", "arpack"])
+@pytest.mark.parametrize("method", METHODS, indirect=True)
 def test_rigid_modes_are_the_rigid_motions(method):
     result = solids.analysed(solids.random_box(6, 4, 3), method=method, modes=20)
     system = result.system
@@ -139,7 +150,7 @@ def test_rigid_modes_are_the_rigid_motions(method):
     assert result.residuals[:RIGID_MODES].max() < 1e-9
 
 
-@pytest.mark.parametrize("method", ["slepc", "arpack"])
+@pytest.mark.parametrize("method", METHODS, indirect=True)
 def test_missed_modes_are_found_and_told(method, lose):
     model = solids.random_box(6, 4, 3)
     exact = solids.dense_eigenvalues(model)[:40]
@@ -199,7 +210,7 @@ def test_without_a_count_modes_are_searched_for_until_there_is_none(lose, monkey
     assert "inertia_count" not in result.evidence
 
 
-@pytest.mark.parametrize("method", ["slepc", "arpack"])
+@pytest.mark.parametrize("method", METHODS, indirect=True)
 @pytest.mark.parametrize("fewer", [0, 1, 8])
 def test_almost_every_mode_of_a_tiny_model_can_be_asked_for(method, fewer):
     model = solids.random_box(2, 2, 1)

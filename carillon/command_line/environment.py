@@ -2,44 +2,49 @@
 
 import argparse
 import json
-import os
-import sys
 from typing import Any
 
-from carillon.errors import UserError
-from carillon.processes import blas
+from carillon.processes import blas, extras, threads
+from carillon.processes.extras import MPI, PETSC, SLEPC
 from carillon.records import provenance
 
 
 def describe() -> dict[str, Any]:
     """Versions, MPI, PETSc and SLEPc with their solvers, BLAS and cores of this environment.
 
-    Raises UserError if PETSc, SLEPc or MPI cannot be imported.
+    MPI, PETSc and SLEPc are None where they are not installed, and their solvers absent then.
     """
-    try:
-        from mpi4py import MPI
-
-        from carillon.processes.petsc import PETSc
-        from carillon.processes.slepc import SLEPc
-    except ImportError as error:
-        raise UserError(
-            f"{error}; expected MPI, PETSc and SLEPc in the environment of {sys.executable}, "
-            "run `make env`"
-        ) from None
     return {
         "versions": provenance.versions(),
-        "mpi": MPI.Get_library_version().split(",")[0].strip("\0 \n"),
-        "petsc": _dotted(PETSc.Sys.getVersion()),
-        "slepc": _dotted(SLEPc.Sys.getVersion()),
-        "mumps": bool(PETSc.Sys.hasExternalPackage("mumps")),
-        "cholmod": bool(PETSc.Sys.hasExternalPackage("suitesparse")),
-        "arpack": bool(SLEPc.Sys.hasExternalPackage("arpack")),
+        **_of_cluster(),
         "blas": blas.blas_name(),
         "blas_by_user": blas.blas_by_user(),
         "reference_blas": blas.is_reference_blas(),
         "processor": provenance.processor(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": threads.allowed_cores(),
     }
+
+
+def _of_cluster() -> dict[str, Any]:
+    """Versions of MPI, PETSc and SLEPc, None of those not installed, and what these bring along."""
+    found: dict[str, Any] = {"mpi": None, "petsc": None, "slepc": None}
+    solvers = dict.fromkeys(("mumps", "cholmod", "arpack"), False)
+    if extras.is_installed(MPI):
+        from carillon.processes.mpi import MPI as mpi  # noqa: N811
+
+        found["mpi"] = mpi.Get_library_version().split(",")[0].strip("\0 \n")
+    if extras.is_installed(PETSC):
+        from carillon.processes.petsc import PETSc
+
+        found["petsc"] = _dotted(PETSc.Sys.getVersion())
+        solvers["mumps"] = bool(PETSc.Sys.hasExternalPackage("mumps"))
+        solvers["cholmod"] = bool(PETSc.Sys.hasExternalPackage("suitesparse"))
+    if extras.is_installed(SLEPC):
+        from carillon.processes.slepc import SLEPc
+
+        found["slepc"] = _dotted(SLEPc.Sys.getVersion())
+        solvers["arpack"] = bool(SLEPc.Sys.hasExternalPackage("arpack"))
+    return found | solvers
 
 
 def _dotted(version: tuple[int, ...]) -> str:
@@ -48,12 +53,13 @@ def _dotted(version: tuple[int, ...]) -> str:
 
 def _print_table(description: dict[str, Any]) -> None:
     versions = dict(description["versions"])
+    absent = f"not installed; {extras.install()}"
     rows = {
         "Carillon": f"{versions.pop('carillon')} on Python {versions.pop('python')}",
         "packages": ", ".join(f"{name} {version}" for name, version in versions.items()),
-        "MPI": description["mpi"],
-        "PETSc": description["petsc"],
-        "SLEPc": description["slepc"],
+        "MPI": description["mpi"] or absent,
+        "PETSc": description["petsc"] or absent,
+        "SLEPc": description["slepc"] or absent,
         "solvers": ", ".join(
             f"{label} {'yes' if description[key] else 'no'}"
             for key, label in (("mumps", "MUMPS"), ("cholmod", "CHOLMOD"), ("arpack", "ARPACK"))
@@ -61,6 +67,8 @@ def _print_table(description: dict[str, Any]) -> None:
         "BLAS": ", ".join(f"{user} {name}" for user, name in description["blas_by_user"].items()),
         "processor": f"{description['processor']}, {description['cores']} cores usable",
     }
+    if description["petsc"] is None:
+        del rows["solvers"]
     for name, text in rows.items():
         print(f"{name:<10} {text}")
 

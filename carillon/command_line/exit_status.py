@@ -14,6 +14,7 @@ from carillon.command_line import logs
 from carillon.command_line.progress import say
 from carillon.errors import ConvergenceError, UserError, one_line
 from carillon.files.paths import cause
+from carillon.processes import extras
 from carillon.processes.slurm_job import job_and_node
 
 EXIT_BAD_INPUT = 2
@@ -111,6 +112,9 @@ def meaning(error: BaseException) -> tuple[int, str | None]:
                 f"out of memory{f' ({said})' if said else ''}; ask for a lower resolution, fewer "
                 "modes or fewer workers, or use a machine with more"
             )
+        case ModuleNotFoundError():
+            lack = extras.lack(error)
+            return (1, None) if lack is None else (EXIT_BAD_INPUT, lack)
         case OSError():
             where = f"{error.filename}: " if error.filename is not None else ""
             return EXIT_BAD_INPUT, one_line(f"{where}{cause(error)}")

@@ -66,13 +66,15 @@ def run_child(
 
 def _tied_to(parent: int) -> Callable[[], None]:
     """What the child does before it becomes the program; it can neither import nor lock there."""
-    control = ctypes.CDLL(None, use_errno=True).prctl
+    # Only Linux has it. Elsewhere the program goes on until it is told to end.
+    control = getattr(ctypes.CDLL(None, use_errno=True), "prctl", None)
 
     def tie() -> None:
         # Where this process does not hear the signal, the program would not either.
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGTERM,))
-        control(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+        if control is not None:
+            control(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
         if os.getppid() != parent:  # which has died before that
             os._exit(1)
 

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import resource
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,6 +25,12 @@ def memory_bytes(group_limit: Path = GROUP_LIMIT) -> int:
         return min(machine, int(group_limit.read_text()))
     except (OSError, ValueError):
         return machine
+
+
+def peak_memory(who: int = resource.RUSAGE_SELF) -> int:
+    """Largest resident memory [bytes] so far of this process, or as `resource.RUSAGE_*` say."""
+    largest = resource.getrusage(who).ru_maxrss
+    return largest if sys.platform == "darwin" else 1024 * largest
 
 
 def available_memory() -> int | None:

@@ -170,6 +170,20 @@ def leave_lonely_step(environment: MutableMapping[str, str]) -> None:
             environment.pop(name, None)
 
 
+def started_ranks(environment: Mapping[str, str]) -> int:
+    """How many ranks a launcher of MPI has started, this one among them; 1 without a launcher.
+
+    Tasks of a step of SLURM's are none: `srun` starts programs that know nothing of MPI, too.
+
+    Examples
+    --------
+    >>> started_ranks({"OMPI_COMM_WORLD_SIZE": "4"}), started_ranks({"SLURM_STEP_NUM_TASKS": "4"})
+    (4, 1)
+    """
+    sizes = (environment.get(size, "") for size, _, of, _ in _SEVERAL if of == _MPIEXEC[0])
+    return max((int(size) for size in sizes if size.isdigit()), default=1)
+
+
 def lonely_among(environment: Mapping[str, str]) -> str | None:
     """What to tell a process that has found no other ranks, if it was started as one of several.
 

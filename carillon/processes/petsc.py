@@ -18,6 +18,7 @@ import threading
 import petsc4py
 
 from carillon.processes.present_folder import elsewhere
+from carillon.processes.threads import look_for_libraries
 
 if "petsc4py.PETSc" not in sys.modules:  # else whoever has loaded it has chosen
     with elsewhere():
@@ -39,3 +40,4 @@ def leave_pipes_to_python() -> None:
 
 
 leave_pipes_to_python()
+look_for_libraries()

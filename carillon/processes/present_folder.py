@@ -59,7 +59,7 @@ def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -
 def elsewhere() -> Iterator[None]:
     """Another present folder, of all threads, in the body; not where this one cannot be entered."""
     try:
-        here = os.open(".", os.O_PATH | os.O_DIRECTORY)
+        here = os.open(".", getattr(os, "O_PATH", os.O_RDONLY) | os.O_DIRECTORY)
     except OSError:  # then nothing in it can be read either
         yield
         return

@@ -18,9 +18,16 @@ from threadpoolctl import ThreadpoolController
 Result = TypeVar("Result")
 
 
+def core_numbers() -> set[int]:
+    """Numbers of the cores that this process may use: all where the system does not tell."""
+    if hasattr(os, "sched_getaffinity"):  # Linux
+        return os.sched_getaffinity(0)
+    return set(range(os.cpu_count() or 1))
+
+
 def allowed_cores() -> int:
     """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+    return len(core_numbers())
 
 
 def allowed_threads() -> int:
@@ -91,6 +98,11 @@ def one_thread() -> Iterator[None]:
             del os.environ["OMP_NUM_THREADS"]
         else:
             os.environ["OMP_NUM_THREADS"] = before
+
+
+def look_for_libraries() -> None:
+    """Have the threads of a BLAS that was loaded just now be limited with those of the others."""
+    _controller.cache_clear()
 
 
 @cache

@@ -12,6 +12,7 @@ import os
 from typing import Any
 
 from carillon.processes.ranks import Comm
+from carillon.processes.threads import core_numbers
 
 NAP_MICROSECONDS = 20
 """Sleep between two looks for messages in microseconds; the system adds some fifty."""
@@ -35,11 +36,11 @@ def _share_cores(comm: Comm) -> bool:
     """Whether the ranks of this machine have fewer cores than they are, or said so."""
     if comm.size == 1:
         return False
-    from mpi4py import MPI
+    from carillon.processes.mpi import MPI
 
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     try:
-        cores = set().union(*machine.allgather(os.sched_getaffinity(0)))
+        cores = set().union(*machine.allgather(core_numbers()))
         return machine.size > len(cores) or os.environ.get(_ASKED) == "1"
     finally:
         machine.Free()

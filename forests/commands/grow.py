@@ -11,13 +11,14 @@ from carillon.errors import UserError
 from carillon.files.paths import require_writable
 from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import Number
+from carillon.processes.memory import peak_memory
 from carillon.processes.ranks import world
 from forests.commands.training import add_training, add_workers, data_of
 from forests.training.dataset import Dataset
 from forests.training.growing import grow_trees
 from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
-from forests.training.spent import Stopwatch, peak_memory
+from forests.training.spent import Stopwatch
 from forests.training.tree_file import save_tree
 
 EXAMPLES = """examples:

@@ -61,7 +61,7 @@ class Ranks:
         """Add the sums of all ranks on the first one; those of the others are nothing then."""
         if self._comm is None:
             return
-        from mpi4py import MPI
+        from carillon.processes.mpi import MPI
 
         sums.carry()
         operations = {"low": MPI.MIN, "high": MPI.MAX}

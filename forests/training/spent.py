@@ -1,6 +1,5 @@
 """Time that a step of a training took, also where it was killed and went on."""
 
-import resource
 import time
 from dataclasses import dataclass
 
@@ -34,8 +33,3 @@ class Stopwatch:
 
     def _now(self) -> Spent:
         return Spent(time.monotonic(), time.process_time())
-
-
-def peak_memory() -> int:
-    """Largest resident memory of this process so far [bytes]."""
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from carillon.command_line.progress import say
+from carillon.processes.memory import peak_memory
 from carillon.records import provenance
 from forests.model import Model, save_model
 from forests.training.dataset import Dataset, Samples
@@ -15,7 +16,7 @@ from forests.training.leaves import Leaves, join, solve_leaves
 from forests.training.options import TrainingOptions, parameters_of
 from forests.training.ranks import Ranks
 from forests.training.scores import held_out_scores, uniform_scores
-from forests.training.spent import Spent, Stopwatch, peak_memory
+from forests.training.spent import Spent, Stopwatch
 from forests.training.structure import Tree
 
 Grown = tuple[dict[int, Tree], Spent]

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.command_line.progress import say
@@ -14,6 +13,7 @@ from carillon.errors import UserError
 from carillon.fem.finite_cells.cells import FiniteCells
 from carillon.fem.finite_cells.covering import MOST_LEVELS, Covering, balanced
 from carillon.fem.finite_cells.model import FiniteCellModel
+from carillon.processes.mpi import MPI
 from solver.accuracy.estimate import HALVED, CellErrors, estimate_cell_errors
 from solver.analysis.modes import Modes
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional

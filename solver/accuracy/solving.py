@@ -6,13 +6,13 @@ from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.materials import NAMES
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import between
+from carillon.processes.mpi import MPI
 from solver.accuracy.divide import DividedCells, solve_refined
 from solver.accuracy.voxels import Reference
 from solver.analysis.modes import Modes

@@ -2,11 +2,10 @@
 
 from typing import cast
 
-from mpi4py import MPI
-
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import Solid
 from carillon.processes.memory import available_memory
+from carillon.processes.mpi import MPI
 from solver.analysis.options import SolverOptions
 from solver.correction.criteria import FEWEST_GUARDS, default_guard
 from solver.distribution.collective import bcast_from_root, ranks_of_machine

@@ -3,11 +3,11 @@
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import Solid
+from carillon.processes.mpi import MPI
 from solver.analysis.bounds import default_keep, uncorrected_keep
 from solver.analysis.options import SolverOptions
 from solver.assembly.system import System

@@ -6,9 +6,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
+from carillon.processes.mpi import MPI
 from solver.analysis.components import ComponentModes, elastic_part, lowest_pairs
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions

@@ -6,6 +6,7 @@ Only their ratios matter, which other processors and ranks change little.
 
 from math import log10
 
+from carillon.processes import extras
 from solver.analysis.options import SolverOptions
 from solver.correction.criteria import EIGENVALUE_TOLERANCE, default_guard
 from solver.linear.rank_tree import RankTree
@@ -33,9 +34,10 @@ def gradients_are_faster(
 ) -> bool:
     """Whether LOBPCG is expected to be clearly faster than block Lanczos; collective.
 
-    It starts from random vectors, or from coarse modes.
+    It starts from random vectors, or from coarse modes. It is not without PETSc, whose multigrid it
+    needs.
     """
-    if n_dofs < FEWEST_UNKNOWNS:
+    if n_dofs < FEWEST_UNKNOWNS or not extras.is_installed(extras.PETSC):
         return False
     factor, solve = tree.operations()
     lanczos = FACTOR * factor + SOLVE * (SOLVES_A_MODE * options.modes + SOLVES) * solve

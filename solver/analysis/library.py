@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 from typing import Any
 
-from mpi4py import MPI
-
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.geometry import HexMesh
 from carillon.fem.materials import young_modulus
 from carillon.fem.model import Solid, fine_model
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root

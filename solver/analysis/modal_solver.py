@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, TypeGuard, cast
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import say
@@ -17,6 +16,7 @@ from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.moduli import require_coarse_moduli
 from carillon.fem.regions import Regions
 from carillon.processes.memory import reuse_freed_memory
+from carillon.processes.mpi import MPI
 from carillon.processes.waiting import leave_cores
 from solver.analysis.bounds import check_mode_count, require_memory
 from solver.analysis.components import distribute_by_parts

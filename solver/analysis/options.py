@@ -18,7 +18,7 @@ from carillon.parameters.quantities import (
 from solver import linear
 from solver.correction.criteria import ACCELERATIONS, EIGENVALUE_TOLERANCE
 from solver.hcms.condense import DEFAULT_INTERFACE, INTERFACES
-from solver.reference.eigensolver import TYPES
+from solver.reference.eigensolver import TYPES, require_method
 from solver.reference.truth import RESIDUAL_TOLERANCE
 
 AUTO = "auto"
@@ -44,8 +44,8 @@ class SolverOptions:
     method: Annotated[str, OneOf(*METHODS)] = option(
         "auto",
         "hcms with error correction; from random vectors lanczos, or lobpcg with multigrid for "
-        "what is too large to factorise; auto, the fastest of these; or ground truth by slepc or "
-        "arpack",
+        "what is too large to factorise; auto, the fastest of these; or ground truth by slepc, or "
+        "arpack, which needs no SLEPc",
     )
     modes: NumberOfModes = option(256, "number of modes, rigid ones included")
     tolerance: ToleranceOrNone | None = option(
@@ -94,7 +94,7 @@ class SolverOptions:
 
     @property
     def is_general(self) -> bool:
-        """Whether an eigensolver of SLEPc's finds the modes, as ground truth."""
+        """Whether a general eigensolver finds the modes, as ground truth."""
         return self.method in TYPES
 
     def for_residuals(self) -> SolverOptions:
@@ -126,8 +126,10 @@ class SolverOptions:
     def with_method(self, n_dofs: int) -> SolverOptions:
         """The same with a method for `auto`: the fastest of those that the other options allow.
 
-        Raises UserError for options that the method has no use for.
+        Raises UserError for options that the method has no use for, and for what needs a package
+        that is not installed.
         """
+        require_method(self.method)
         given = {
             "--retained-modes": self.retained_modes,
             "--cutoff": self.cutoff,
@@ -153,7 +155,9 @@ class SolverOptions:
                     f"--method lobpcg has no use for --linear-solver {self.linear_solver}; use "
                     "lanczos"
                 )
+            linear.require_method("amg-cg", "--method lobpcg")
             return replace(self, linear_solver="amg-cg")
+        linear.require_method(self.linear_solver)
         if self.method != AUTO:
             return self
         if strange or n_dofs < LEAST_UNKNOWNS * self.modes:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import resource
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from mpi4py import MPI
-
 from carillon.command_line.progress import say
+from carillon.processes.memory import peak_memory
+from carillon.processes.mpi import MPI
 
 START = "start"
 """Phase from the start of the process until its clock is made: imports, and the start of MPI."""
@@ -96,7 +95,7 @@ class RankClock:
         other = RankCost(
             max(time.perf_counter() - self._begin - phases.seconds, 0.0),
             max(time.process_time() - self._processor - phases.processor_seconds, 0.0),
-            peak_memory_bytes=local_peak_memory(),
+            peak_memory_bytes=peak_memory(),
         )
         ranks = self._comm.gather({**self.costs, OTHER: other}) or []
         names = dict.fromkeys(name for rank in ranks for name in rank)
@@ -114,7 +113,7 @@ class RankClock:
         self._comm.barrier()
         end = time.perf_counter()
         self._processor += time.process_time() - busy  # it polls, and belongs to no phase
-        cost = RankCost(end - begin, busy - processor, end - ready, local_peak_memory())
+        cost = RankCost(end - begin, busy - processor, end - ready, peak_memory())
         self.costs[name] = self.costs.get(name, RankCost()) + cost
 
 
@@ -151,17 +150,15 @@ class Phases:
 
 
 def process_age() -> float:
-    """Wall time [s] since this process was started, to a hundredth."""
-    fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    """Wall time [s] since this process was started, to a hundredth; 0 where only Linux tells."""
+    try:
+        fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
     started = int(fields[19]) / os.sysconf("SC_CLK_TCK")
     return max(time.clock_gettime(time.CLOCK_BOOTTIME) - started, 0.0)
 
 
-def local_peak_memory() -> int:
-    """Largest resident memory [bytes] of this process so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-
-
-def peak_memory(comm: MPI.Comm) -> int:
+def largest_peak_memory(comm: MPI.Comm) -> int:
     """Largest peak memory [bytes] of any rank so far; collective."""
-    return int(comm.allreduce(local_peak_memory(), op=MPI.MAX))
+    return int(comm.allreduce(peak_memory(), op=MPI.MAX))

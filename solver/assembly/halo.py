@@ -1,9 +1,9 @@
 """Exchange of the rows that ranks need of each other: one message a neighbour."""
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
+from carillon.processes.mpi import MPI
 
 _HALO = 21
 

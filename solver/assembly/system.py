@@ -14,13 +14,13 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.fem.block import degrees_of_freedom
 from carillon.fem.element import rigid_motions
 from carillon.fem.elements import Elements
-from carillon.processes.petsc import PETSc
+from carillon.processes import extras
+from carillon.processes.mpi import MPI
 from solver.assembly import narrow
 from solver.assembly.halo import Halo
 from solver.assembly.node_rows import NodeRows, Pattern
@@ -28,6 +28,11 @@ from solver.distribution.collective import compute_on_root, gather_rows
 from solver.distribution.local_mesh import LocalMesh
 
 Number = TypeVar("Number", np.float64, np.int64)
+
+if MPI.Is_initialized() and MPI.COMM_WORLD.size > 1:
+    # PETSc and SLEPc start on all ranks together, and one rank may come to need them alone. One
+    # process loads them when it needs them.
+    extras.load_cluster()
 
 COLUMNS_GATHERED = 16
 """Number of columns that travel to rank 0 together where a block is gathered or written."""
@@ -81,6 +86,8 @@ class System:
     n_dofs: int
     """Number of unknowns over all ranks."""
     comm: MPI.Comm
+    layout: Layout
+    """What it has in common with other materials on its mesh."""
 
     def distance_from_supports(self) -> Array | None:
         """Distance (local nodes,) from the nearest support, in half extents; None without any."""
@@ -243,6 +250,7 @@ def assemble(
         local_mesh.stop,
         local_mesh.n_dofs,
         comm,
+        layout,
     )
     factor = np.linalg.cholesky(system.inner(motions, mass_motions))
     rigid, mass_rigid = (
@@ -267,6 +275,8 @@ def _centred(local_mesh: LocalMesh, comm: MPI.Comm) -> tuple[Array, Array, float
 
 def distributed_matrix(rows: sp.csr_matrix, comm: Any) -> Any:
     """Symmetric PETSc matrix from this rank's rows (local, n), in blocks of three unknowns."""
+    from carillon.processes.petsc import PETSc
+
     local, total = rows.shape
     csr = (
         rows.indptr.astype(PETSc.IntType),

@@ -10,14 +10,13 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from mpi4py import MPI
-
 from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.errors import UserError, on_all_ranks
 from carillon.fem.model import Solid
 from carillon.parameters.command_line import add_options, collect, reader
 from carillon.parameters.quantities import Resolution
+from carillon.processes.mpi import MPI
 from solver.accuracy.solving import (
     FIRST_RESOLUTION,
     AccuracyRequest,

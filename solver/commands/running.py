@@ -6,14 +6,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from mpi4py import MPI
-
 from carillon.command_line import outputs
 from carillon.fem.model import Solid
 from carillon.files.atomic import atomic_path
 from carillon.parameters.command_line import add_options, collect
 from carillon.processes.blas import warn_about_reference_blas
-from carillon.processes.petsc import PETSc
+from carillon.processes.mpi import MPI
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.distribution.collective import bcast_from_root, share_cores
@@ -35,12 +33,14 @@ def on_ranks(petsc: str | None = None) -> Iterator[MPI.Comm]:
     """All ranks, with their share of the cores; what PETSc refuses of `petsc` is one sentence."""
     comm = MPI.COMM_WORLD
     share_cores(comm)
-    if comm.rank == 0:
+    if comm.rank == 0 and comm.size > 1:
         warn_about_reference_blas()
     try:
         yield comm
-    except PETSc.Error as error:
+    except petsc_options.errors() as error:
         raise petsc_options.meaning(error, petsc) from error
+    if comm.size == 1:  # which loads PETSc when it is needed
+        warn_about_reference_blas()
 
 
 WALL = ("wall", "wall_side")

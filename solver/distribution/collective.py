@@ -5,20 +5,19 @@ their time for every message.
 """
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.command_line.exit_status import meaning
 from carillon.command_line.progress import say
 from carillon.errors import one_line
-from carillon.processes.threads import limit_threads
+from carillon.processes.mpi import MPI
+from carillon.processes.threads import core_numbers, limit_threads
 
 Number = TypeVar("Number", np.float64, np.int64)
 T = TypeVar("T")
@@ -121,7 +120,7 @@ def share_cores(comm: MPI.Comm) -> int:
     """
     machine = machine_of(comm)
     try:
-        cores = set[int]().union(*machine.allgather(os.sched_getaffinity(0)))
+        cores = set[int]().union(*machine.allgather(core_numbers()))
         return limit_threads(machine.size, len(cores))
     finally:
         machine.Free()

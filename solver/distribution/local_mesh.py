@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Flags, Index
 from carillon.fem.elements import Chosen, Elements
 from carillon.fem.model import Solid
 from carillon.fem.regions import Regions
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import AnyArray, bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.decomposition import Decomposition, decompose, decompose_by_planes
 from solver.distribution.planes import lattice_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import cast
 
-from mpi4py import MPI
+from carillon.processes.mpi import MPI
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Rows of vectors from one cut of a solid to another, on the same ranks: one message a pair."""
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
+from carillon.processes.mpi import MPI
 from solver.distribution.local_mesh import LocalMesh
 
 _REDISTRIBUTED = 22

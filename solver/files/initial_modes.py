@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Integers
 from carillon.errors import UserError
@@ -12,6 +11,7 @@ from carillon.fem.block import degrees_of_freedom
 from carillon.fem.model import Solid
 from carillon.files.datasets import INTEGER, find, finite, read
 from carillon.files.hdf5 import open_h5
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import bcast_from_root, receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh
 from solver.files.cells_group import FINITE_CELLS

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import Sent
 from solver.hcms.lowest import BLOCK_FRACTION, STEPS
 

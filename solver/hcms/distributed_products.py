@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import AnyArray, Sent, receive_arrays, send_arrays
 from solver.hcms.counts import Tally, product_flops
 

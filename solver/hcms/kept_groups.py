@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.elasticity import Elasticity
 from carillon.fem.elements import Elements
+from carillon.processes.mpi import MPI
 from solver.distribution.tree import MergeTree
 from solver.hcms.merge import Group
 

@@ -3,9 +3,8 @@
 from collections.abc import Collection
 from typing import NamedTuple
 
-from mpi4py import MPI
-
 from carillon.arrays import Array
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import AnyArray, Sent, receive_arrays, send_arrays
 from solver.distribution.local_mesh import Cells, LocalMesh
 from solver.distribution.tree import Merge

@@ -11,12 +11,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.linalg import blas
 
 from carillon.arrays import Array, Index
-from carillon.processes.petsc import PETSc
+from carillon.processes import extras
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import receive_arrays, send_arrays
 from solver.hcms.counts import Tally, count_shared_eigenproblem
 from solver.hcms.merge import Reduced
@@ -33,7 +33,9 @@ _PENCIL, _VECTORS = 21, 22
 
 
 def available() -> bool:
-    """Whether PETSc was built with a ScaLAPACK that has what is needed here."""
+    """Whether PETSc is installed, with a ScaLAPACK that has what is needed here."""
+    if not extras.is_installed(extras.PETSC):
+        return False
     library = _library()
     return all(hasattr(library, name) for name in _ROUTINES)
 
@@ -130,6 +132,8 @@ class ProcessGrid:
 
 @cache
 def _library() -> ctypes.CDLL:
+    from carillon.processes.petsc import PETSc
+
     return ctypes.CDLL(PETSc.__file__)
 
 

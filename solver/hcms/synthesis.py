@@ -11,10 +11,10 @@ that theirs are made of and for no others.
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.block import degrees_of_freedom
+from carillon.processes.mpi import MPI
 from carillon.processes.threads import in_parallel
 from solver.distribution.collective import receive_arrays, send_arrays
 from solver.distribution.local_mesh import LocalMesh

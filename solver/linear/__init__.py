@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from carillon.arrays import Array
 from carillon.errors import UserError, on_all_ranks
+from carillon.processes import extras
+from carillon.processes.extras import PETSC
 
 if TYPE_CHECKING:
     from solver.assembly.system import Layout, System
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 METHODS = ("auto", "multifrontal", "mumps", "icc-pcg", "amg-cg")
 ITERATIVE = ("icc-pcg", "amg-cg")
+OF_PETSC = ("mumps", *ITERATIVE)
+"""Methods that need PETSc."""
 MEMORY_SHARE = 0.8
 """Share of the free memory that a factorisation may take."""
 
@@ -121,19 +125,22 @@ class LinearSolver:
         `multifrontal`: sparse factorisation by blocks.  `mumps`: the same by MUMPS.  `icc-pcg`:
         conjugate gradients with incomplete Cholesky, the paper's.  `amg-cg`: conjugate gradients
         with algebraic multigrid, for models too large to factorise.  `auto`: `multifrontal` if the
-        memory of all machines holds it, or else `amg-cg`.
+        memory of all machines holds it, or PETSc is not installed, or else `amg-cg`.
     """
 
     def __init__(self, method: str, layout: Layout) -> None:
         self._layout = layout
-        _require_method(method)
+        require_method(method)
         self._asked = method
 
     @cached_property
     def method(self) -> str:
         """The method, which `auto` stands for; collective when first asked for."""
         if self._asked == "auto":
-            return "multifrontal" if self.tree.fits(MEMORY_SHARE) else "amg-cg"
+            # Without PETSc a factorisation is begun, which says how much memory it lacks.
+            if self.tree.fits(MEMORY_SHARE) or not extras.is_installed(PETSC):
+                return "multifrontal"
+            return "amg-cg"
         if self._asked == "multifrontal":
             self.tree  # noqa: B018
         return self._asked
@@ -179,6 +186,10 @@ class LinearSolver:
 
 
 @on_all_ranks()
-def _require_method(method: str) -> None:
+def require_method(method: str, what: str = "") -> None:
+    """Raise UserError for an unknown method, or one that `what` needs and is not installed."""
     if method not in METHODS:
         raise UserError(f"linear solver {method!r}, expected one of {', '.join(METHODS)}")
+    if method in OF_PETSC:
+        what = what or f"--linear-solver {method}"
+        extras.require(PETSC, what, "leave it out: auto takes what is there")

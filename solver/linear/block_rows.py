@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from carillon.arrays import Array
+from carillon.processes.mpi import MPI
 from solver.assembly.halo import Halo
 from solver.assembly.row_products import RowProducts
 

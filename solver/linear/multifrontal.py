@@ -17,6 +17,7 @@ from carillon.errors import LocalConvergenceError
 from carillon.numerics.simd import empty
 from carillon.numerics.simd_width import LANES
 from carillon.numerics.small_gemm import lanes_of
+from carillon.processes import extras
 from carillon.processes.memory import available_memory
 from carillon.processes.threads import in_parallel, split
 from solver.linear.elimination import eliminate_fronts
@@ -163,8 +164,10 @@ def require_memory(unknowns: int, needed: int) -> None:
     """
     available = available_memory()
     if available is not None and needed > available:
+        remedy = "use --linear-solver amg-cg, or more ranks on more machines"
+        if not extras.is_installed(extras.PETSC):
+            remedy = f"lower the resolution, or install PETSc, {extras.install()}"
         raise LocalConvergenceError(
             f"the sparse factorisation of {unknowns:,} unknowns takes about "
-            f"{needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; use --linear-solver "
-            "amg-cg, or more ranks on more machines"
+            f"{needed / 1e9:.1f} GB, {available / 1e9:.1f} GB are free; {remedy}"
         )

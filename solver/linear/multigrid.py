@@ -12,11 +12,11 @@ from typing import Any
 import numba
 import numpy as np
 import scipy.linalg as la
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.numerics.simd_width import LANES
 from carillon.processes.memory import give_back_freed_memory
+from carillon.processes.mpi import MPI
 from carillon.processes.petsc import PETSc
 from solver.assembly.row_products import RowProducts
 from solver.linear.block_rows import block_rows, diagonal

@@ -1,11 +1,18 @@
 """Options that people hand to PETSc and SLEPc, and what those say to them."""
 
+from __future__ import annotations
+
 import ctypes
+import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from carillon.errors import UserError, on_all_ranks
-from carillon.processes.petsc import PETSc
+from carillon.processes import extras
+
+if TYPE_CHECKING:
+    from carillon.processes.petsc import PETSc
 
 OPTIONS_PREFIX = "carillon_"
 """Prefix of PETSc's options for this program."""
@@ -28,6 +35,11 @@ def insert_options(text: str | None, method: str = "slepc") -> None:
     Raises UserError if an option lacks the prefix, and would be ignored by the method or mean
     something for the whole program.
     """
+    if text is None and not _inserted:
+        return
+    extras.require(extras.PETSC, "--petsc", "leave it out")
+    from carillon.processes.petsc import PETSc
+
     for name in _inserted:
         PETSc.Options().delValue(name)
     _inserted.clear()
@@ -89,6 +101,15 @@ def _library() -> ctypes.CDLL | None:
             if Path(path).name.startswith("libpetsc"):
                 return ctypes.CDLL(path)
     return None
+
+
+def errors() -> tuple[type[Exception], ...]:
+    """Exceptions of PETSc's, for `except`: none where it was not loaded, and cannot raise any."""
+    if "petsc4py.PETSc" not in sys.modules:
+        return ()
+    from carillon.processes.petsc import PETSc
+
+    return (PETSc.Error,)
 
 
 def meaning(error: PETSc.Error, text: str | None) -> Exception:

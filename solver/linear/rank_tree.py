@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.block import degrees_of_freedom
 from carillon.processes.memory import available_memory, give_back_freed_memory
+from carillon.processes.mpi import MPI
 from solver.distribution.collective import on_every_rank, sum_over_machine
 from solver.distribution.rank_groups import communicator
 from solver.linear.elimination import eliminate_fronts

@@ -6,11 +6,11 @@ A solve then is products with dense rows, with two exchanges on the way up and o
 """
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import LocalConvergenceError
 from carillon.numerics.gemm import subtract_product
+from carillon.processes.mpi import MPI
 from carillon.processes.threads import in_parallel
 from solver.linear.elimination import roots_of
 from solver.linear.shared_front import SharedFront

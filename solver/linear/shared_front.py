@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.numerics.simd import compiler
+from carillon.processes.mpi import MPI
 from carillon.processes.threads import split
 from solver.linear.panels import STRIP
 

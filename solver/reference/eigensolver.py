@@ -1,25 +1,26 @@
-"""SLEPc's Lanczos methods in shift-and-invert mode, set up in one place."""
-
-from contextlib import suppress
-from typing import Any
+"""General eigensolvers in shift-and-invert mode: SLEPc's, and SciPy's where there is no SLEPc."""
 
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.errors import UserError, on_all_ranks
-from carillon.processes.petsc import PETSc
-from carillon.processes.slepc import SLEPc
+from carillon.processes import extras
+from carillon.processes.extras import SLEPC
 from solver.assembly.system import System
-from solver.linear.factorisation import definite_packages
-from solver.linear.petsc_options import OPTIONS_PREFIX, require_known_options
 
-TYPES = {"slepc": SLEPc.EPS.Type.KRYLOVSCHUR, "arpack": SLEPc.EPS.Type.ARPACK}
-MAX_ITERATIONS = 500
-ARPACK_MARGIN = 2
-"""Number of unknowns that ARPACK needs beyond the requested pairs."""
-SUBSPACE, FEWEST_MORE = 1.25, 24
-"""Vectors that Krylov-Schur keeps for each pair wanted, and least number beyond these.  To make the
-two a pair that SLEPc would keep orthogonal takes longer than the solves that they save."""
+KRYLOV_SCHUR, ARPACK = "slepc", "arpack"
+TYPES = (KRYLOV_SCHUR, ARPACK)
+"""Methods: Krylov-Schur, which is SLEPc's, and ARPACK, which SciPy has, too."""
+
+
+def installed_method() -> str:
+    """Krylov-Schur where SLEPc is installed, ARPACK elsewhere."""
+    return KRYLOV_SCHUR if extras.is_installed(SLEPC) else ARPACK
+
+
+def require_method(method: str) -> None:
+    """Raise UserError unless a method is installed."""
+    if method == KRYLOV_SCHUR:
+        extras.require(SLEPC, f"--method {method}", f"take --method {ARPACK}")
 
 
 def smallest_eigenpairs(
@@ -29,7 +30,7 @@ def smallest_eigenpairs(
     shift: float,
     start: Array,
     tolerance: float,
-    method: str = "slepc",
+    method: str = KRYLOV_SCHUR,
     configurable: bool = True,
 ) -> tuple[Array, Array, int]:
     """Eigenpairs of K x = lambda M x that are M-orthogonal to known ones, lowest eigenvalues first.
@@ -37,12 +38,10 @@ def smallest_eigenpairs(
     The Krylov space of one vector holds one vector of every eigenspace, and more by rounding alone:
     copies of a multiple eigenvalue may be missed.
 
-    Krylov-Schur deflates the known vectors.  ARPACK cannot, since SLEPc lets it keep its basis
-    where the deflated vectors are: it finds as many pairs more, of which those in the span of the
-    known ones are dropped. Returns values (k,) ascending, vectors (local, k), outer iterations; k
-    may be smaller than `count`, which is for the caller to judge.  The vectors are M-orthonormal
-    but for copies of a multiple eigenvalue, which are so to the tolerance. Raises UserError if this
-    SLEPc lacks the method.
+    Returns values (k,) ascending, vectors (local, k), outer iterations; k may be smaller than
+    `count`, which is for the caller to judge.  The vectors are M-orthonormal but for copies of a
+    multiple eigenvalue, which are so to the tolerance. Raises UserError if the method is not
+    installed.
 
     Parameters
     ----------
@@ -55,88 +54,33 @@ def smallest_eigenpairs(
     start
         (local,) vector that the Krylov space is made from.
     method
-        `slepc` (Krylov-Schur) or `arpack`.
+        `slepc` (Krylov-Schur) or `arpack`, which is SciPy's where SLEPc is not installed.
     configurable
         Whether PETSc's options database may overrule this set-up.
     """
-    *others, last = definite_packages(system.comm.size)
+    require_method(method)
+    given = system, known, count, shift, start, tolerance
+    if extras.is_installed(SLEPC):
+        from solver.reference import slepc_lanczos
 
-    def search(package: str) -> tuple[Array, Array, int]:
-        solver = SLEPc.EPS().create(system.comm)
-        vectors = [_petsc_vector(start, system.comm)]
-        try:
-            try:
-                solver.setType(TYPES[method])
-            except PETSc.Error:
-                with on_all_ranks():
-                    raise UserError(
-                        f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
-                    ) from None
-            solver.setOperators(system.K, system.M)
-            solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-            solver.setTolerances(tolerance, MAX_ITERATIONS)
-            solver.setInitialSpace(vectors[0])
-            asked = count
-            if method == "arpack":
-                asked = min(count + known.shape[1], system.n_dofs - ARPACK_MARGIN)
-                solver.setDimensions(asked)
-            else:
-                vectors += [_petsc_vector(column, system.comm) for column in known.T]
-                solver.setDeflationSpace(vectors[1:])
-                subspace = max(round(SUBSPACE * asked), asked + FEWEST_MORE)
-                solver.setDimensions(asked, min(subspace, system.n_dofs))
-            solver.setTarget(-shift)
-            solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-            transform = solver.getST()
-            transform.setType(SLEPc.ST.Type.SINVERT)
-            transform.setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            linear = transform.getKSP()
-            linear.setType(PETSc.KSP.Type.PREONLY)
-            preconditioner = linear.getPC()
-            preconditioner.setType(PETSc.PC.Type.CHOLESKY)
-            preconditioner.setFactorSolverType(package)
-            if configurable:
-                solver.setOptionsPrefix(OPTIONS_PREFIX)
-                solver.setFromOptions()
-                solver.setUp()
-                require_known_options()
-            solver.solve()
-            values, modes = _collect(system, solver, min(solver.getConverged(), asked))
-            values, modes = _outside(system, known, values, modes)
-            return values[:count], modes[:, :count], int(solver.getIterationNumber())
-        finally:
-            for used in (solver, *vectors):
-                used.destroy()
+        found = slepc_lanczos.smallest_eigenpairs(*given, method, configurable)
+    else:
+        if system.comm.size > 1:
+            extras.require(
+                SLEPC, f"a search by ARPACK on {system.comm.size} ranks", "start one process"
+            )
+        from solver.reference import scipy_arpack
 
-    for package in others:
-        with suppress(PETSc.Error):
-            return search(package)
-    return search(last)
-
-
-def _petsc_vector(entries: Array, comm: Any) -> Any:
-    return PETSc.Vec().createWithArray(np.array(entries), comm=comm)
-
-
-def _collect(system: System, solver: SLEPc.EPS, count: int) -> tuple[Array, Array]:
-    """The first `count` eigenpairs, values ascending, vectors row-major."""
-    values = np.array([solver.getEigenvalue(index).real for index in range(count)])
-    # Two processors may round apart, but have to agree on the order of a multiple eigenvalue.
-    values = system.comm.bcast(values)
-    order = np.argsort(values, kind="stable")
-    vector = system.K.createVecRight()
-    vectors = np.empty((vector.getLocalSize(), count))
-    for column, index in enumerate(order):
-        solver.getEigenpair(int(index), vector)
-        vectors[:, column] = vector.getArray(readonly=True)
-    vector.destroy()
-    return values[order], vectors
+        found = scipy_arpack.smallest_eigenpairs(*given)
+    values, vectors = _outside(system, known, *found[:2])
+    return values[:count], vectors[:, :count], found[2]
 
 
 def _outside(system: System, known: Array, values: Array, vectors: Array) -> tuple[Array, Array]:
     """The pairs that are not in the span of the known ones, made M-orthogonal to it.
 
-    SLEPc ends with a product with the inverse, which brings back a little of inaccurate known ones.
+    Shift-and-invert ends with a product with the inverse, which brings back a little of inaccurate
+    known ones.
     """
     share = system.inner(system.times_mass(known), vectors)
     outside = np.einsum("ij,ij->j", share, share) < 0.5

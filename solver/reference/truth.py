@@ -1,4 +1,4 @@
-"""Ground truth by SLEPc: shift-and-invert Krylov-Schur or ARPACK, with proof of completeness."""
+"""Ground truth: shift-and-invert Krylov-Schur or ARPACK, with proof of completeness."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -7,10 +7,11 @@ import numpy as np
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
-from carillon.processes.petsc import PETSc
+from carillon.processes import extras
+from carillon.processes.extras import PETSC
 from solver.assembly.system import System
-from solver.linear.factorisation import count_negative
-from solver.reference.eigensolver import smallest_eigenpairs
+from solver.linear import LinearSolver
+from solver.reference.eigensolver import installed_method, smallest_eigenpairs
 from solver.subspace.rayleigh_ritz import is_orthonormal, rayleigh_ritz, rigid_pairs, safe_shift
 from solver.subspace.start import start_vector
 
@@ -71,7 +72,8 @@ def solve_truth(
     Parameters
     ----------
     method
-        `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode.
+        `slepc` (Krylov-Schur) or `arpack`, both in shift-and-invert mode; see
+        `solver.reference.eigensolver`.
     spare
         Modes beyond, among which `count_beyond` looks for a gap.
     """
@@ -90,7 +92,14 @@ def solve_truth(
 
 
 def can_count() -> bool:
-    """Whether this PETSc can count eigenvalues by inertia, for which it needs MUMPS."""
+    """Whether eigenvalues can be counted by inertia, for which PETSc needs MUMPS.
+
+    Where PETSc is not installed Carillon's own factorisation counts.
+    """
+    if not extras.is_installed(PETSC):
+        return True
+    from carillon.processes.petsc import PETSc
+
     return bool(PETSc.Sys.hasExternalPackage("mumps"))
 
 
@@ -99,11 +108,20 @@ def count_beyond(
 ) -> Inertia:
     """Count, by the inertia of K - mu M, the eigenvalues below a mu beyond the last wanted one.
 
-    The shift mu lies in the widest gap among the spare modes.  MUMPS counts, unless `count` does.
+    The shift mu lies in the widest gap among the spare modes.  MUMPS counts, unless `count` does,
+    or PETSc is not installed.
     """
     value, computed = _gap(truth.values, truth.modes, system.n_dofs)
-    counted = count(system, value) if count else count_negative(system.K, system.M, value)
-    return Inertia(value, counted, computed)
+    return Inertia(value, (count or count_below)(system, value), computed)
+
+
+def count_below(system: System, value: float) -> int:
+    """Eigenvalues of K - value M below zero, by inertia; see `can_count`; collective."""
+    if not extras.is_installed(PETSC):
+        return LinearSolver("multifrontal", system.layout).count_below(system, value)
+    from solver.linear.factorisation import count_negative
+
+    return count_negative(system.K, system.M, value)
 
 
 def complete(
@@ -113,7 +131,7 @@ def complete(
     tolerance: float = RESIDUAL_TOLERANCE,
     seed: int = 0,
 ) -> tuple[Truth, Inertia | None]:
-    """Find the eigenpairs that `truth` lacks, by Krylov-Schur in the complement of those it has.
+    """Find the eigenpairs that `truth` lacks, by a search in the complement of those it has.
 
     Every search starts from another vector and deflates what is there, so that of each multiple
     eigenvalue it finds one copy at least.  Without a count the first search that finds nothing
@@ -171,7 +189,7 @@ def _with_lowest(
 ) -> Truth:
     """`truth` with the lowest eigenpairs below a value that one search finds in its complement.
 
-    Without a method Krylov-Schur as it is set up here does it, whatever PETSc's options say.
+    Without a method what is installed does it, as it is set up here, whatever PETSc's options say.
     """
     values, vectors, iterations = smallest_eigenpairs(
         system,
@@ -180,7 +198,7 @@ def _with_lowest(
         safe_shift(system),
         start,
         tolerance,
-        method or "slepc",
+        method or installed_method(),
         configurable=method is not None,
     )
     if not is_orthonormal(system, vectors, system.times_mass(vectors)):

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.fem.model import ElasticModel
+from carillon.processes.mpi import MPI
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root, optional

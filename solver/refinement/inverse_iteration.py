@@ -13,11 +13,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.geometry import Blocks
 from carillon.fem.model import ElasticModel
+from carillon.processes.mpi import MPI
 from solver.analysis.coarse_start import prolonged
 from solver.analysis.modal_solver import ModalSolver, Prepared
 from solver.analysis.options import RANDOM

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
-from mpi4py import MPI
-
 from carillon.fem.model import Solid
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Initial, Modes
 from solver.analysis.options import SolverOptions

@@ -8,18 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES
-from carillon.processes.petsc import PETSc
+from carillon.processes.mpi import MPI
 from solver.assembly.sparse import assembled
-from solver.assembly.system import assemble, distributed_matrix
+from solver.assembly.system import assemble
 from solver.distribution.local_mesh import distribute
 from solver.files.modes_file import ModesFile
-from solver.linear.factorisation import count_negative, factorised, solve_dense
-from solver.reference.truth import can_count
 from solver.subspace.rayleigh_ritz import first_elastic_estimate
+from solver.verification.factored import Factored, factored
 from solver.verification.residuals import (
     COLUMNS_AT_ONCE,
     count_rigid,
@@ -77,6 +75,7 @@ def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:
     assert file.modes is not None
     values, modes = file.eigenvalues, file.modes
     K, M = assembled(file.model)
+    factors = factored(file.model, K, M)
     rigid = file.model.rigid_modes
     with np.errstate(all="ignore"):  # judged below
         residuals = recomputed_residuals(K, M, values, modes, rigid)
@@ -89,38 +88,38 @@ def measure_evidence(file: ModesFile, tolerance: float) -> ModesEvidence:
         file.model.n_dofs,
         float(residuals.max()),
         float(np.median(residuals)),
-        _energy_residuals(K, M, values, modes, residuals, rigid).tolist(),
+        _energy_residuals(K, M, factors, values, modes, residuals, rigid).tolist(),
         _rounding(K, values, modes, rigid).tolist(),
         _quotient_errors(K, values, modes, gram, rigid).tolist(),
         float(np.abs(gram - np.eye(len(gram))).max()),
         _count_rigid(file, K),
         value,
-        _count(K, M, value) if can_count() else None,
+        factors.count_below(value),
         expected,
         file.model.mass,
     )
 
 
 def _energy_residuals(
-    K: sp.csr_matrix, M: sp.csr_matrix, values: Array, modes: Array, ratios: Array, rigid: int
+    K: sp.csr_matrix,
+    M: sp.csr_matrix,
+    factors: Factored,
+    values: Array,
+    modes: Array,
+    ratios: Array,
+    rigid: int,
 ) -> Array:
     result = ratios.copy()
     largest = np.argsort(ratios)[-FEWEST_SOLVED:]
     columns = np.union1d(np.flatnonzero(ratios > NEGLIGIBLE), largest)
     scale = residual_scale(values, rigid)
-    matrix = distributed_matrix((K + values[-1] * M).tocsr(), MPI.COMM_SELF)
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    factorisation = factorised(matrix, {})
-    for start in range(0, len(columns), COLUMNS_AT_ONCE):
-        few = columns[start : start + COLUMNS_AT_ONCE]
-        chosen = modes[:, few]
-        residual = np.asfortranarray(K @ chosen - (M @ chosen) * values[few])
-        factor = factorisation.getFactorMatrix()
-        solution = solve_dense(factor, residual, len(residual), MPI.COMM_SELF)
-        square = np.einsum("ij,ij->j", residual, solution)
-        result[few] = np.sqrt(np.maximum(square, 0.0) / scale[few])
-    factorisation.destroy()
-    matrix.destroy()
+    with factors.inverse(values[-1]) as solve:
+        for start in range(0, len(columns), COLUMNS_AT_ONCE):
+            few = columns[start : start + COLUMNS_AT_ONCE]
+            chosen = modes[:, few]
+            residual = K @ chosen - (M @ chosen) * values[few]
+            square = np.einsum("ij,ij->j", residual, solve(residual))
+            result[few] = np.sqrt(np.maximum(square, 0.0) / scale[few])
     return result
 
 
@@ -171,12 +170,3 @@ def gap_below_last(values: Array, gap: float = GAP, rigid: int = RIGID_MODES) ->
     wide = np.flatnonzero(gaps > gap)
     below = rigid + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
     return float(0.5 * (values[below - 1] + values[below])), below
-
-
-def _count(K: sp.csr_matrix, M: sp.csr_matrix, value: float) -> int:
-    stiffness, mass = (distributed_matrix(part, MPI.COMM_SELF) for part in (K, M))
-    try:
-        return count_negative(stiffness, mass, value)
-    finally:
-        stiffness.destroy()
-        mass.destroy()

@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.composition.composition import PlacedRegions
@@ -23,6 +22,7 @@ from carillon.fem.model import ElasticModel, fine_model
 from carillon.fem.regions import RegionOf, Regions
 from carillon.fem.supports import Supports
 from carillon.limits import FEWEST_MODES
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

@@ -173,7 +173,7 @@ def _budget(optimiser: OptimiserSettings, more: str = "") -> str:
 
 
 def _require_one_rank() -> None:
-    from mpi4py import MPI
+    from carillon.processes.mpi import MPI
 
     if MPI.COMM_WORLD.size > 1:
         raise UserError(

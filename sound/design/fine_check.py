@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from scipy.optimize import linear_sum_assignment
 
 from carillon.arrays import Array, Index
@@ -11,6 +10,7 @@ from carillon.fem.block import degrees_of_freedom
 from carillon.fem.geometry import hexmesh_from_grid
 from carillon.fem.model import ElasticModel, Solid, fine_model
 from carillon.limits import FEWEST_MODES
+from carillon.processes.mpi import MPI
 from carillon.processes.threads import one_thread
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes

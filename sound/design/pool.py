@@ -14,8 +14,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
 from multiprocessing.queues import SimpleQueue
-from tempfile import TemporaryFile
+from tempfile import NamedTemporaryFile, TemporaryFile
 from threading import Thread
+from typing import IO
 
 from carillon.errors import ConvergenceError, UserError
 from carillon.processes import children
@@ -60,12 +61,22 @@ class Pool:
             Thread(target=_pass_on, args=(steps, tell), daemon=True).start()
         # What processes are started with has to fit into a pipe, or one that died before it had
         # read all would be waited for. So they read the setting from a file, which has no name.
-        file = self._held.enter_context(TemporaryFile())
+        file, path = self._nameless_file()
         pickle.dump(setting, file)
         file.flush()
-        path = f"/proc/{os.getpid()}/fd/{file.fileno()}"
         self._pool = children.ProcessPool(workers, _prepare_apart, path, steps)
         self._begin = time.thread_time()
+
+    def _nameless_file(self) -> tuple[IO[bytes], str]:
+        """A file for other processes to read while the pool lives, and the path that they open.
+
+        Where the system gives none to files without a name, it has one.
+        """
+        if os.path.isdir("/proc/self/fd"):
+            file = self._held.enter_context(TemporaryFile())
+            return file, f"/proc/{os.getpid()}/fd/{file.fileno()}"
+        named = self._held.enter_context(NamedTemporaryFile())
+        return named.file, named.name
 
     @property
     def seconds(self) -> float:

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from carillon.arrays import Array, Index
@@ -20,6 +19,7 @@ from carillon.fem.model import Solid
 from carillon.fem.regions import Regions
 from carillon.fem.supports import Supports
 from carillon.limits import FEWEST_MODES
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

@@ -1,11 +1,11 @@
 """A solid's frequencies, and the errors that its model expects of them."""
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import Solid
+from carillon.processes.mpi import MPI
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.accuracy.solving import AccuracyRequest, Solved, solve_solid
 from solver.analysis.modal_solver import modal_analysis

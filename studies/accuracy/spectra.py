@@ -4,12 +4,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Surface
 from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.model import Solid, fine_model
 from carillon.fem.regions import Regions
+from carillon.processes.mpi import MPI
 from solver.accuracy.estimate import estimate_cell_errors
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions

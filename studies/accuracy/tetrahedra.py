@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from carillon.arrays import Array, Index
 from carillon.errors import one_line
+from carillon.processes.mpi import MPI
 from carillon.processes.slepc import SLEPc
 from solver.assembly.system import distributed_matrix
 from solver.linear.factorisation import factor_package

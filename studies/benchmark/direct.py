@@ -7,13 +7,13 @@ from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.model import Solid
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.quantities import NumberOfModes, between
+from carillon.processes.mpi import MPI
 from carillon.processes.threads import allowed_threads
 from solver.analysis.modal_solver import Prepared
 from solver.correction.shift import inverse_amid

@@ -6,10 +6,10 @@ from functools import partial
 from importlib import import_module
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.errors import ConvergenceError, one_line
 from carillon.fem.model import RIGID_MODES
+from carillon.processes.mpi import MPI
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.reference.truth import Truth, can_count, complete, count_beyond

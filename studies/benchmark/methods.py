@@ -4,10 +4,9 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from mpi4py import MPI
-
 from carillon.arrays import Array
 from carillon.fem.model import RIGID_MODES, Solid
+from carillon.processes.mpi import MPI
 from solver.analysis.coarse_start import coarse_start
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes

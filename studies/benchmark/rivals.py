@@ -9,18 +9,18 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError
 from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.processes.mpi import MPI
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.assembly.system import System, assemble
 from solver.distribution.local_mesh import distribute
 from solver.linear.factorisation import definite_packages
 from solver.linear.petsc_options import OPTIONS_PREFIX
-from solver.reference.eigensolver import FEWEST_MORE, SUBSPACE
+from solver.reference.slepc_lanczos import FEWEST_MORE, SUBSPACE
 from solver.subspace.rayleigh_ritz import rigid_pairs
 
 PACKAGES = {"cholmod": "suitesparse", "mumps": "mumps"}

@@ -7,12 +7,12 @@ from functools import partial
 from typing import Any, cast
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import surface_name
 from carillon.processes.blas import blas_name, loaded_blas
+from carillon.processes.mpi import MPI
 from solver.analysis.problem import ProblemOptions
 from solver.distribution.collective import bcast_from_root, compute_on_root
 from solver.verification.matching import AUDIBLE_LAST

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as sla
-from mpi4py import MPI
 
 from carillon.errors import ConvergenceError
+from carillon.processes.mpi import MPI
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.assembly.system import distributed_matrix

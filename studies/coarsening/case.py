@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.geometry import Blocks, prolongation
 from carillon.fem.model import ElasticModel
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

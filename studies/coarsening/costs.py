@@ -5,9 +5,8 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar
 
-from mpi4py import MPI
-
 from carillon.fem.model import ElasticModel
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from solver.coarsening.coarsening import Coarsening

@@ -5,11 +5,11 @@ from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.fem.model import RIGID_MODES, ElasticModel
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

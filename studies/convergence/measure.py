@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import UserError
 from carillon.fem.model import Solid
+from carillon.processes.mpi import MPI
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions

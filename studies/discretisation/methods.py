@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array, Surface
 from carillon.fem.finite_cells.covering import Covering
@@ -13,6 +12,7 @@ from carillon.fem.finite_cells.model import FiniteCellModel, finite_cell_model
 from carillon.fem.geometry import HexMesh, hexmesh_from_voxels, voxelize
 from carillon.fem.geometry.grid import Grid
 from carillon.fem.model import Constants, Solid, fine_model
+from carillon.processes.mpi import MPI
 from solver.accuracy.divide import DividedCells, solve_refined
 from solver.accuracy.material import ARITHMETIC, HARMONIC, PlacedMaterial
 from solver.accuracy.voxels import covering_on

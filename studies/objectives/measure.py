@@ -10,13 +10,13 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import track
 from carillon.errors import ConvergenceError
 from carillon.fem.geometry import Blocks, blocks_from_mesh
 from carillon.fem.model import RIGID_MODES, ElasticModel, Solid
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

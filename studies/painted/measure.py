@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.command_line.progress import say
 from carillon.fem.model import RIGID_MODES, ElasticModel
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import NumberOfModes, between
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.modes import Modes
 from solver.analysis.options import SolverOptions

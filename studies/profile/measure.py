@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, cast
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES, Solid
 from carillon.parameters import option, parameters
 from carillon.parameters.quantities import NumberOfModes, between
+from carillon.processes.mpi import MPI
 from carillon.processes.threads import in_parallel, split
 from solver.analysis.modal_solver import ModalSolver
 from solver.analysis.options import SolverOptions

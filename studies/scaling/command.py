@@ -8,9 +8,8 @@ import dataclasses
 import json
 from typing import Any
 
-from mpi4py import MPI
-
 from carillon.parameters.command_line import add_options, collect
+from carillon.processes.mpi import MPI
 from carillon.records.measurement import measured
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions, build_problem

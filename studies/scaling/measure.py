@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.fem.model import Solid
 from carillon.processes.memory import reuse_freed_memory
+from carillon.processes.mpi import MPI
 from solver.analysis.bounds import check_mode_count, default_keep
 from solver.analysis.components import distribute_by_parts, elastic_part
 from solver.analysis.options import SolverOptions

@@ -5,7 +5,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge
-from mpi4py import MPI
 
 from carillon.arrays import Array, Surface
 from carillon.command_line.progress import track
@@ -16,6 +15,7 @@ from carillon.fem.geometry.grid import Grid
 from carillon.fem.model import RIGID_MODES
 from carillon.fem.regions import Regions
 from carillon.parameters import option, parameters
+from carillon.processes.mpi import MPI
 from solver.analysis.modal_solver import modal_analysis
 from solver.analysis.options import SolverOptions
 from studies.accuracy.solids import DENSITY, POISSON, YOUNG

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from carillon.arrays import Array
 from carillon.errors import ConvergenceError, UserError
 from carillon.fem.finite_cells.model import FiniteCellModel
 from carillon.fem.model import RIGID_MODES, Solid
+from carillon.processes.mpi import MPI
 from solver.accuracy.solving import AccuracyRequest, solve_solid
 from solver.analysis.options import SolverOptions
 from solver.analysis.problem import ProblemOptions
