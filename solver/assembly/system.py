@@ -29,10 +29,9 @@ from solver.distribution.local_mesh import LocalMesh
 
 Number = TypeVar("Number", np.float64, np.int64)
 
-if MPI.Is_initialized() and MPI.COMM_WORLD.size > 1:
-    # PETSc and SLEPc start on all ranks together, and one rank may come to need them alone. One
-    # process loads them when it needs them.
-    extras.load_cluster()
+# PETSc and SLEPc start on all ranks together, and one rank may come to need them alone. One
+# process loads them too: all parts of a run then use, and report, one BLAS.
+extras.load_cluster()
 
 COLUMNS_GATHERED = 16
 """Number of columns that travel to rank 0 together where a block is gathered or written."""
