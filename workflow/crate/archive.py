@@ -1,0 +1,84 @@
+"""The ZIP file of a crate: every file is read once, for its copy, length and SHA-256."""
+
+import hashlib
+import time
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from carillon.command_line.progress import track
+from carillon.errors import UserError
+from carillon.files.atomic import atomic_path
+from carillon.files.paths import cause
+from workflow.crate.contents import Part
+
+METADATA = "ro-crate-metadata.json"
+DENSE = (".h5", ".png", ".jpg", ".webp", ".zip", ".mp4")
+"""Endings of files that do not become smaller."""
+EARLIEST = (1980, 1, 1, 0, 0, 0)
+"""Of the dates that ZIP files know."""
+_PIECE = 1 << 20
+
+
+@dataclass(frozen=True)
+class Copied:
+    """A file as it is in a crate."""
+
+    part: Part
+    size: int
+    """Bytes."""
+    sha256: str
+    modified: float
+    """Time of its last change [s since 1970]."""
+
+
+def write_archive(
+    path: Path, parts: Sequence[Part], describe: Callable[[Sequence[Copied]], str]
+) -> list[Copied]:
+    """Write a ZIP file of files and of their metadata, which `describe` makes; returns the files.
+
+    Equal files, with equal times, make equal bytes. The archive is whole or absent. Raises
+    UserError if a file cannot be read or the archive not written.
+    """
+    total = sum(part.path.stat().st_size for part in parts)
+    copied: list[Copied] = []
+    with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+        for each in track(_copies(archive, parts), "crate", total, "B", weight=lambda c: c.size):
+            copied.append(each)
+        last = max(each.modified for each in copied)
+        _add(archive, _entry(METADATA, last), iter([describe(copied).encode()]))
+    return copied
+
+
+def _copies(archive: zipfile.ZipFile, parts: Sequence[Part]) -> Iterator[Copied]:
+    for part in parts:
+        try:
+            with open(part.path, "rb") as stream:
+                modified = part.path.stat().st_mtime
+                pieces = iter(lambda: stream.read(_PIECE), b"")
+                yield Copied(part, *_add(archive, _entry(part.name, modified), pieces), modified)
+        except OSError as error:
+            raise UserError(f"{part.path}: cannot be copied ({cause(error)})") from error
+
+
+def _entry(name: str, modified: float) -> zipfile.ZipInfo:
+    moment = max(EARLIEST, time.gmtime(modified)[:6])
+    entry = zipfile.ZipInfo(name, moment)
+    entry.external_attr = 0o644 << 16
+    dense = name.endswith(DENSE)
+    entry.compress_type = zipfile.ZIP_STORED if dense else zipfile.ZIP_DEFLATED
+    return entry
+
+
+def _add(
+    archive: zipfile.ZipFile, entry: zipfile.ZipInfo, pieces: Iterator[bytes]
+) -> tuple[int, str]:
+    """Add a file; returns its bytes and their SHA-256."""
+    checksum, size = hashlib.sha256(), 0
+    with archive.open(entry, "w", force_zip64=True) as target:
+        for piece in pieces:
+            target.write(piece)
+            checksum.update(piece)
+            size += len(piece)
+    return size, checksum.hexdigest()
