@@ -19,7 +19,6 @@ from workflow import settings
 from workflow.crate import contents, graph
 from workflow.crate.archive import Copied, write_archive
 from workflow.crate.citation import citation
-from workflow.crate.contents import Role
 from workflow.crate.origins import origin_of
 
 EXAMPLES = """examples:
@@ -61,18 +60,16 @@ def run(arguments: argparse.Namespace) -> None:
     Raises UserError for a folder that is not that of a run, or if it cannot be written.
     """
     results = Path(arguments.results)
-    arguments.out = arguments.out or Path(f"{results.resolve().name}.crate.zip")
-    if arguments.out.suffix != ".zip":
+    if arguments.out is not None and arguments.out.suffix != ".zip":
         raise UserError(f"{arguments.out}: a crate is a ZIP file, whose name ends with .zip")
     graph.require_rocrate()
     found = contents.results_of(results, arguments.leave_out)
+    arguments.out = arguments.out or Path(f"{results.resolve().name}.crate.zip")
     found = [part for part in found if not _is_same(part.path, arguments.out)]
     config = settings.complete([results / contents.CONFIGURATION])
     about = _description(config, arguments.creator, arguments.licence)
     made_by = {
-        part.name: origin
-        for part in found
-        if part.role is Role.RESULT and (origin := origin_of(part.path))
+        part.name: origin for part in found if part.is_result and (origin := origin_of(part.path))
     }
     named = {file for origin in made_by.values() for file in origin.inputs}
     parts = [*contents.rules(), *contents.inputs(config, named), *found]

@@ -43,6 +43,11 @@ class Part:
     original: str = ""
     """Path by which the run knew it, if that is another."""
 
+    @property
+    def is_result(self) -> bool:
+        """Whether the run has made it, other than as a trace of itself."""
+        return self.role is Role.RESULT
+
 
 def results_of(results: Path, left_out: Iterable[str] = ()) -> list[Part]:
     """Files below the folder of a run's results, its configuration first.
@@ -51,8 +56,8 @@ def results_of(results: Path, left_out: Iterable[str] = ()) -> list[Part]:
     Raises UserError if the folder is not that of a run, or a name or link cannot be in a crate.
     """
     _require_run(results)
-    parts = sorted(_results(results, left_out), key=lambda part: part.role is Role.RESULT)
-    if not any(part.role is Role.RESULT for part in parts):
+    parts = sorted(_results(results, left_out), key=lambda part: part.is_result)
+    if not any(part.is_result for part in parts):
         raise UserError(
             f"{results}: holds no results but {CONFIGURATION}, expected those of a run; "
             "run the workflow first"
@@ -135,8 +140,8 @@ def _results(results: Path, left_out: Iterable[str]) -> Iterator[Part]:
 
 
 def _below(results: Path, name: str) -> Path:
-    path = Path(os.path.normpath(results / name))
-    if results not in path.parents or not os.path.lexists(path):
+    path = results / name
+    if ".." in Path(name).parts or results not in path.parents or not os.path.lexists(path):
         raise UserError(f"--leave-out {name}: there is no such file or folder below {results}")
     return path
 

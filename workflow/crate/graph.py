@@ -78,11 +78,11 @@ def metadata_of(files: Sequence[Copied], origins: Mapping[str, Origin], about: D
 
     graph = _Graph(ROCrate(version="1.1"), about)
     entities = {each.part.name: graph.file(each) for each in files}
-    graph.describe_root(_moment(max(each.modified for each in files)))
+    moments = {each.part.name: _moment(each.modified) for each in files}
+    graph.describe_root(max(moments[each.part.name] for each in files if each.part.is_result))
     graph.add_run(files, entities)
     for name, origin in origins.items():
-        moment = next(_moment(each.modified) for each in files if each.part.name == name)
-        graph.add_command(entities[name], origin, moment)
+        graph.add_command(entities[name], origin, moments[name])
     document = graph.crate.metadata.generate()
     document["@graph"] = [_compact(entity) for entity in document["@graph"]]
     return json.dumps(document, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
@@ -168,7 +168,7 @@ class _Graph:
 
         workflow, results = entities[SNAKEFILE], of(Role.RESULT)
         workflow["hasPart"] = [each for each in of(Role.RULES) if each is not workflow]
-        last = max(each.modified for each in files if each.part.role is Role.RESULT)
+        last = max(each.modified for each in files if each.part.is_result)
         self._act(
             "#run",
             f"Run of the workflow: {self.about.title}",
