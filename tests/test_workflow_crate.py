@@ -17,8 +17,8 @@ from carillon.records import provenance
 from tests.programs import CHECKOUT
 from workflow import settings
 from workflow.__main__ import main
-from workflow.crate.archive import METADATA
 from workflow.crate.contents import SNAKEFILE, Role, results_of
+from workflow.crate.graph import METADATA, README
 
 SOLID = {"resolution": 12, "material": "smooth"}
 MODELS = {"bar": SOLID | {"mesh": "my bar.obj"}, "plate": SOLID | {"mesh": "builtin:plate"}}
@@ -144,6 +144,13 @@ def test_a_run_of_somebody_else_names_its_creator_and_licence(results):
     assert identifiers(known["./"]["license"]) == ["https://spdx.org/licenses/CC-BY-4.0"]
     (author,) = (known[each] for each in identifiers(known[SNAKEFILE]["author"]))
     assert author["name"] == "The Carillon developers"
+
+
+def test_the_page_for_people_says_what_to_cite(results):
+    page = crate(results, "--licence", "CC-BY-4.0")[README].decode()
+    assert page.startswith("# Two bells & \\<b\\>\n")
+    for words in ("CC-BY-4.0", f"Carillon {ca.__version__}", "Kazuhiko Yamamoto", "2016"):
+        assert words in page
 
 
 def test_what_is_left_out_is_not_in_the_crate(results):
@@ -274,5 +281,5 @@ def test_a_file_that_vanishes_while_it_is_copied_leaves_no_crate(results, monkey
     monkeypatch.setattr(archive, "_copies", vanish)
     parts = results_of(results)
     with pytest.raises(UserError, match=r"empty\.csv: cannot be copied"):
-        archive.write_archive(Path("run.zip"), parts, lambda files: "{}")
+        archive.write_archive(Path("run.zip"), parts, lambda files: {})
     assert not list(Path().glob("*zip*"))

@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> None:
     parts = [*contents.rules(), *contents.inputs(config, named), *found]
     require_outputs(arguments, [part.path for part in parts])
     files = write_archive(
-        arguments.out, parts, lambda copied: graph.metadata_of(copied, made_by, about)
+        arguments.out, parts, lambda copied: graph.texts_of(copied, made_by, about)
     )
     _tell(arguments.out, files, len(made_by), arguments.json)
 

@@ -3,7 +3,7 @@
 import hashlib
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,6 @@ from carillon.files.atomic import atomic_path
 from carillon.files.paths import cause
 from workflow.crate.contents import Part
 
-METADATA = "ro-crate-metadata.json"
 DENSE = (".h5", ".png", ".jpg", ".webp", ".zip", ".mp4")
 """Endings of files that do not become smaller."""
 EARLIEST = (1980, 1, 1, 0, 0, 0)
@@ -34,21 +33,31 @@ class Copied:
 
 
 def write_archive(
-    path: Path, parts: Sequence[Part], describe: Callable[[Sequence[Copied]], str]
+    path: Path, parts: Sequence[Part], describe: Callable[[Sequence[Copied]], Mapping[str, str]]
 ) -> list[Copied]:
-    """Write a ZIP file of files and of their metadata, which `describe` makes; returns the files.
+    """Write a ZIP file of files and of texts about them; returns the files.
+
+    `describe` makes the texts, by their names, from the files as they were copied.
 
     Equal files, with equal times, make equal bytes. The archive is whole or absent. Raises
     UserError if a file cannot be read or the archive not written.
     """
-    total = sum(part.path.stat().st_size for part in parts)
+    total = sum(map(_size, parts))
     copied: list[Copied] = []
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for each in track(_copies(archive, parts), "crate", total, "B", weight=lambda c: c.size):
             copied.append(each)
         last = max(each.modified for each in copied)
-        _add(archive, _entry(METADATA, last), iter([describe(copied).encode()]))
+        for name, text in describe(copied).items():
+            _add(archive, _entry(name, last), iter([text.encode()]))
     return copied
+
+
+def _size(part: Part) -> int:
+    try:
+        return part.path.stat().st_size
+    except OSError as error:
+        raise UserError(f"{part.path}: cannot be copied ({cause(error)})") from error
 
 
 def _copies(archive: zipfile.ZipFile, parts: Sequence[Part]) -> Iterator[Copied]:

@@ -6,6 +6,7 @@ https://w3id.org/workflowhub/workflow-ro-crate/1.0.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import mimetypes
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,11 +21,13 @@ from workflow.crate.archive import Copied
 from workflow.crate.citation import is_person, name_of
 from workflow.crate.contents import SNAKEFILE, Role
 from workflow.crate.origins import Origin
+from workflow.crate.readme import readme_of
 
 if TYPE_CHECKING:
     from rocrate.model import ContextEntity, File
     from rocrate.rocrate import ROCrate
 
+README, METADATA = "README.md", "ro-crate-metadata.json"
 REQUIREMENTS = "workflow/envs/requirements-workflow.txt"
 PROFILES = {
     "Process Run Crate": "https://w3id.org/ro/wfrun/process/0.5",
@@ -72,20 +75,28 @@ def require_rocrate() -> None:
         ) from None
 
 
-def metadata_of(files: Sequence[Copied], origins: Mapping[str, Origin], about: Description) -> str:
-    """Text of `ro-crate-metadata.json`; `origins` are by the name of the file in the crate."""
+def texts_of(
+    files: Sequence[Copied], origins: Mapping[str, Origin], about: Description
+) -> dict[str, str]:
+    """Texts of a crate's README.md and metadata, by their names.
+
+    `origins` are by the name of the file in the crate.
+    """
     from rocrate.rocrate import ROCrate
 
+    readme = readme_of(about.title, about.licence, about.software)
     graph = _Graph(ROCrate(version="1.1"), about)
     entities = {each.part.name: graph.file(each) for each in files}
     moments = {each.part.name: _moment(each.modified) for each in files}
     graph.describe_root(max(moments[each.part.name] for each in files if each.part.is_result))
+    graph.add_readme(readme)
     graph.add_run(files, entities)
     for name, origin in origins.items():
         graph.add_command(entities[name], origin, moments[name])
     document = graph.crate.metadata.generate()
     document["@graph"] = [_compact(entity) for entity in document["@graph"]]
-    return json.dumps(document, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+    metadata = json.dumps(document, indent=1, ensure_ascii=False, sort_keys=True)
+    return {README: readme, METADATA: metadata + "\n"}
 
 
 class _Graph:
@@ -159,6 +170,18 @@ class _Graph:
             for name, uri in PROFILES.items()
         ]
         root["mentions"] = []
+
+    def add_readme(self, text: str) -> None:
+        """Add the page for people."""
+        content = text.encode()
+        properties = {
+            "name": README,
+            "about": self.crate.root_dataset,
+            "contentSize": str(len(content)),
+            "sha256": hashlib.sha256(content).hexdigest(),
+            "encodingFormat": _format(README),
+        }
+        self.crate.add_file(dest_path=README, properties=properties)
 
     def add_run(self, files: Sequence[Copied], entities: Mapping[str, File]) -> None:
         """Say that the workflow has made the results, from its configuration and inputs."""
