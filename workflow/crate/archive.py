@@ -11,7 +11,7 @@ from carillon.command_line.progress import track
 from carillon.errors import UserError
 from carillon.files.atomic import atomic_path
 from carillon.files.paths import cause
-from workflow.crate.contents import Part
+from workflow.crate.contents import CrateFile
 
 DENSE = (".h5", ".png", ".jpg", ".webp", ".zip", ".mp4")
 """Endings of files that do not become smaller."""
@@ -24,7 +24,7 @@ _PIECE = 1 << 20
 class Copied:
     """A file as it is in a crate."""
 
-    part: Part
+    part: CrateFile
     size: int
     """Bytes."""
     sha256: str
@@ -33,7 +33,9 @@ class Copied:
 
 
 def write_archive(
-    path: Path, parts: Sequence[Part], describe: Callable[[Sequence[Copied]], Mapping[str, str]]
+    path: Path,
+    parts: Sequence[CrateFile],
+    describe: Callable[[Sequence[Copied]], Mapping[str, str]],
 ) -> list[Copied]:
     """Write a ZIP file of files and of texts about them; returns the files.
 
@@ -53,14 +55,14 @@ def write_archive(
     return copied
 
 
-def _size(part: Part) -> int:
+def _size(part: CrateFile) -> int:
     try:
         return part.path.stat().st_size
     except OSError as error:
         raise UserError(f"{part.path}: cannot be copied ({cause(error)})") from error
 
 
-def _copies(archive: zipfile.ZipFile, parts: Sequence[Part]) -> Iterator[Copied]:
+def _copies(archive: zipfile.ZipFile, parts: Sequence[CrateFile]) -> Iterator[Copied]:
     for part in parts:
         try:
             with open(part.path, "rb") as stream:

@@ -33,7 +33,7 @@ class Role(Enum):
 
 
 @dataclass(frozen=True)
-class Part:
+class CrateFile:
     """A file of a crate."""
 
     name: str
@@ -49,7 +49,7 @@ class Part:
         return self.role is Role.RESULT
 
 
-def results_of(results: Path, left_out: Iterable[str] = ()) -> list[Part]:
+def results_of(results: Path, left_out: Iterable[str] = ()) -> list[CrateFile]:
     """Files below the folder of a run's results, its configuration first.
 
     `left_out`: files and folders below `results` that stay out of the crate. Hidden files do, too.
@@ -81,17 +81,17 @@ def _require_run(results: Path) -> None:
         )
 
 
-def rules() -> list[Part]:
+def rules() -> list[CrateFile]:
     """The rules of the workflow; folders are those of a checkout."""
     rooms = settings.FOLDER.parent
     others = sorted([*rooms.glob("workflow/rules/*.smk"), *rooms.glob("studies/*/*.smk")])
     return [
-        Part(SNAKEFILE, settings.FOLDER / "Snakefile", Role.RULES),
-        *(Part(path.relative_to(rooms).as_posix(), path, Role.RULES) for path in others),
+        CrateFile(SNAKEFILE, settings.FOLDER / "Snakefile", Role.RULES),
+        *(CrateFile(path.relative_to(rooms).as_posix(), path, Role.RULES) for path in others),
     ]
 
 
-def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[Part]:
+def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[CrateFile]:
     """Files that a run was made from: meshes, materials, regions, forests.
 
     `named`: those that the results name, beside those of the configuration. The forests of the
@@ -101,7 +101,7 @@ def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[Part]:
     forests = settings.forests_file(config)
     files |= {*named} if forests is None else {*named, forests}
     own, results = default_path(), Path(config["results_dir"]).resolve()
-    parts: list[Part] = []
+    parts: list[CrateFile] = []
     for file in sorted(files):
         path = require_file(file, "an input of the run; make the crate in the folder of the run")
         if results in path.resolve().parents or (own.is_file() and path.samefile(own)):
@@ -113,11 +113,11 @@ def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[Part]:
         )
         name = next(name for name in names if f"{INPUTS}/{name}" not in taken)
         require_plain(Path(name))
-        parts.append(Part(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
+        parts.append(CrateFile(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
     return parts
 
 
-def _results(results: Path, left_out: Iterable[str]) -> Iterator[Part]:
+def _results(results: Path, left_out: Iterable[str]) -> Iterator[CrateFile]:
     """Files below a folder of results, in the order of their names.
 
     A link is refused: what it leads to may be anything, and the crate is published.
@@ -136,7 +136,7 @@ def _results(results: Path, left_out: Iterable[str]) -> Iterator[Part]:
                 continue
             require_file(path, "a result of the run")
             below = path.relative_to(results)
-            yield Part(f"{RESULTS}/{below.as_posix()}", path, _role(below))
+            yield CrateFile(f"{RESULTS}/{below.as_posix()}", path, _role(below))
 
 
 def _below(results: Path, name: str) -> Path:
