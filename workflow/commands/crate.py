@@ -14,6 +14,7 @@ from typing import Any
 
 from carillon.command_line.counts import counted
 from carillon.command_line.outputs import require_outputs
+from carillon.command_line.progress import track
 from carillon.errors import UserError
 from workflow import settings
 from workflow.crate import contents, graph
@@ -65,19 +66,21 @@ def run(arguments: argparse.Namespace) -> None:
     graph.require_rocrate()
     found = contents.results_of(results, arguments.leave_out)
     arguments.out = arguments.out or Path(f"{results.resolve().name}.crate.zip")
-    found = [part for part in found if not _is_same(part.path, arguments.out)]
+    found = [file for file in found if not _is_same(file.path, arguments.out)]
     config = settings.complete([results / contents.CONFIGURATION])
     about = _description(config, arguments.creator, arguments.licence)
     made_by = {
-        part.name: origin for part in found if part.is_result and (origin := origin_of(part.path))
+        file.name: origin
+        for file in track(found, "records", unit="files")
+        if file.is_result and (origin := origin_of(file.path))
     }
-    named = {file for origin in made_by.values() for file in origin.inputs}
-    parts = [*contents.rules(), *contents.inputs(config, named), *found]
-    require_outputs(arguments, [part.path for part in parts])
-    files = write_archive(
-        arguments.out, parts, lambda copied: graph.texts_of(copied, made_by, about)
+    named = {name for origin in made_by.values() for name in origin.inputs}
+    files = [*contents.rules(), *contents.inputs(config, named), *found]
+    require_outputs(arguments, [file.path for file in files])
+    copied = write_archive(
+        arguments.out, files, lambda copies: graph.texts_of(copies, made_by, about)
     )
-    _tell(arguments.out, files, len(made_by), arguments.json)
+    _tell(arguments.out, copied, len(made_by), arguments.json)
 
 
 def _description(
