@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import shutil
 import zipfile
 from pathlib import Path
@@ -165,6 +166,12 @@ def test_the_same_results_make_the_same_bytes_again(results):
     assert Path("run.zip").read_bytes() == first
 
 
+def test_dates_beyond_those_of_zip_files_do_not_matter(results):
+    os.utime(results / "empty.csv", (0, 0))
+    os.utime(results / "0.h5", (1 << 33, 1 << 33))
+    assert {"results/empty.csv", "results/0.h5"} <= set(crate(results))
+
+
 def test_a_crate_among_the_results_is_not_part_of_the_next(results):
     out = results / "run.zip"
     for _ in range(2):
@@ -178,6 +185,11 @@ def test_what_the_run_has_made_itself_is_no_input(results):
     (results / "of_box.json").write_text(json.dumps({"provenance": record}))
     shutil.copy("meshes/my bar.obj", results / "box.obj")
     assert "inputs/box.obj" not in crate(results)
+
+
+def test_inputs_are_told_by_name_as_the_results_of_others_may_name_any_file(results, capsys):
+    crate(results)
+    assert capsys.readouterr().out.splitlines()[-1] == "inputs: meshes/my bar.obj"
 
 
 def test_inputs_of_one_name_are_all_in_the_crate(results):

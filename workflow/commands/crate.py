@@ -107,12 +107,16 @@ def _is_same(one: Path, other: Path) -> bool:
 
 
 def _tell(out: Path, files: Sequence[Copied], commands: int, as_json: bool) -> None:
+    """Say what was written; inputs by name, since results of others may name any file."""
     size = sum(each.size for each in files)
+    inputs = [each.file.original for each in files if each.file.role is contents.Role.INPUT]
     if as_json:
         told = {"out": str(out), "files": len(files), "bytes": size, "with_command": commands}
-        print(json.dumps(told, indent=2))
+        print(json.dumps(told | {"inputs": inputs}, indent=2))
         return
     print(
         f"{out}: {counted(len(files), 'file')}, {size / 1e6:,.1f} MB, "
         f"{counted(commands, 'result')} with the command that made it"
     )
+    if inputs:
+        print(f"inputs: {', '.join(inputs)}")

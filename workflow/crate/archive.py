@@ -15,8 +15,8 @@ from workflow.crate.contents import CrateFile
 
 DENSE = (".h5", ".png", ".jpg", ".webp", ".zip", ".mp4")
 """Endings of files that do not become smaller."""
-EARLIEST = (1980, 1, 1, 0, 0, 0)
-"""Of the dates that ZIP files know."""
+EARLIEST, LATEST = (1980, 1, 1, 0, 0, 0), (2107, 12, 31, 23, 59, 58)
+"""First and last of the dates that ZIP files know."""
 _PIECE = 1 << 20
 
 
@@ -24,7 +24,7 @@ _PIECE = 1 << 20
 class Copied:
     """A file as it is in a crate."""
 
-    part: CrateFile
+    file: CrateFile
     size: int
     """Bytes."""
     sha256: str
@@ -34,7 +34,7 @@ class Copied:
 
 def write_archive(
     path: Path,
-    parts: Sequence[CrateFile],
+    files: Sequence[CrateFile],
     describe: Callable[[Sequence[Copied]], Mapping[str, str]],
 ) -> list[Copied]:
     """Write a ZIP file of files and of texts about them; returns the files.
@@ -44,10 +44,10 @@ def write_archive(
     Equal files, with equal times, make equal bytes. The archive is whole or absent. Raises
     UserError if a file cannot be read or the archive not written.
     """
-    total = sum(map(_size, parts))
+    total = sum(map(_size, files))
     copied: list[Copied] = []
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-        for each in track(_copies(archive, parts), "crate", total, "B", weight=lambda c: c.size):
+        for each in track(_copies(archive, files), "crate", total, "B", weight=lambda c: c.size):
             copied.append(each)
         last = max(each.modified for each in copied)
         for name, text in describe(copied).items():
@@ -55,26 +55,26 @@ def write_archive(
     return copied
 
 
-def _size(part: CrateFile) -> int:
+def _size(file: CrateFile) -> int:
     try:
-        return part.path.stat().st_size
+        return file.path.stat().st_size
     except OSError as error:
-        raise UserError(f"{part.path}: cannot be copied ({cause(error)})") from error
+        raise UserError(f"{file.path}: cannot be copied ({cause(error)})") from error
 
 
-def _copies(archive: zipfile.ZipFile, parts: Sequence[CrateFile]) -> Iterator[Copied]:
-    for part in parts:
+def _copies(archive: zipfile.ZipFile, files: Sequence[CrateFile]) -> Iterator[Copied]:
+    for file in files:
         try:
-            with open(part.path, "rb") as stream:
-                modified = part.path.stat().st_mtime
+            with open(file.path, "rb") as stream:
+                modified = file.path.stat().st_mtime
                 pieces = iter(lambda: stream.read(_PIECE), b"")
-                yield Copied(part, *_add(archive, _entry(part.name, modified), pieces), modified)
+                yield Copied(file, *_add(archive, _entry(file.name, modified), pieces), modified)
         except OSError as error:
-            raise UserError(f"{part.path}: cannot be copied ({cause(error)})") from error
+            raise UserError(f"{file.path}: cannot be copied ({cause(error)})") from error
 
 
 def _entry(name: str, modified: float) -> zipfile.ZipInfo:
-    moment = max(EARLIEST, time.gmtime(modified)[:6])
+    moment = min(max(EARLIEST, time.gmtime(modified)[:6]), LATEST)
     entry = zipfile.ZipInfo(name, moment)
     entry.external_attr = 0o644 << 16
     dense = name.endswith(DENSE)

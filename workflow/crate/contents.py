@@ -50,21 +50,21 @@ class CrateFile:
 
 
 def results_of(results: Path, left_out: Iterable[str] = ()) -> list[CrateFile]:
-    """Files below the folder of a run's results, its configuration first.
+    """Files below the folder of a run's results, its configuration among them.
 
     `left_out`: files and folders below `results` that stay out of the crate. Hidden files do, too.
     Raises UserError if the folder is not that of a run, or a name or link cannot be in a crate.
     """
     _require_run(results)
-    parts = sorted(_results(results, left_out), key=lambda part: part.is_result)
-    if not any(part.is_result for part in parts):
+    files = list(_results(results, left_out))
+    if not any(file.is_result for file in files):
         raise UserError(
             f"{results}: holds no results but {CONFIGURATION}, expected those of a run; "
             "run the workflow first"
         )
-    for part in parts:
-        require_plain(Path(part.name))
-    return parts
+    for file in files:
+        require_plain(Path(file.name))
+    return files
 
 
 def _require_run(results: Path) -> None:
@@ -101,20 +101,20 @@ def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[CrateFile]:
     forests = settings.forests_file(config)
     files |= {*named} if forests is None else {*named, forests}
     own, results = default_path(), Path(config["results_dir"]).resolve()
-    parts: list[CrateFile] = []
+    found: list[CrateFile] = []
     for file in sorted(files):
         path = require_file(file, "an input of the run; make the crate in the folder of the run")
         if results in path.resolve().parents or (own.is_file() and path.samefile(own)):
             continue
-        taken = {part.name for part in parts}
+        taken = {each.name for each in found}
         names = (
             f"{path.stem}{number}{path.suffix}"
             for number in chain([""], map("-{}".format, count(2)))
         )
         name = next(name for name in names if f"{INPUTS}/{name}" not in taken)
         require_plain(Path(name))
-        parts.append(CrateFile(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
-    return parts
+        found.append(CrateFile(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
+    return found
 
 
 def _results(results: Path, left_out: Iterable[str]) -> Iterator[CrateFile]:

@@ -86,9 +86,9 @@ def texts_of(
 
     readme = readme_of(about.title, about.licence, about.software)
     graph = _Graph(ROCrate(version="1.1"), about)
-    entities = {each.part.name: graph.file(each) for each in files}
-    moments = {each.part.name: _moment(each.modified) for each in files}
-    graph.describe_root(max(moments[each.part.name] for each in files if each.part.is_result))
+    entities = {each.file.name: graph.file(each) for each in files}
+    moments = {each.file.name: _moment(each.modified) for each in files}
+    graph.describe_root(max(moments[each.file.name] for each in files if each.file.is_result))
     graph.add_readme(readme)
     graph.add_run(files, entities)
     for name, origin in origins.items():
@@ -122,18 +122,18 @@ class _Graph:
 
     def file(self, copied: Copied) -> File:
         """Add a file."""
-        part = copied.part
+        source = copied.file
         properties: dict[str, Any] = {
-            "name": PurePosixPath(part.name).name,
+            "name": PurePosixPath(source.name).name,
             "contentSize": str(copied.size),
             "sha256": copied.sha256,
             "dateModified": _moment(copied.modified),
-            "encodingFormat": _format(part.name),
+            "encodingFormat": _format(source.name),
         }
-        if part.original and part.original != part.name:
-            properties["alternateName"] = part.original
-        if part.name != SNAKEFILE:
-            return self.crate.add_file(dest_path=part.name, properties=properties)
+        if source.original and source.original != source.name:
+            properties["alternateName"] = source.original
+        if source.name != SNAKEFILE:
+            return self.crate.add_file(dest_path=source.name, properties=properties)
         software = self.about.software
         properties |= {
             "name": f"{software['title']}: {software['abstract'].rstrip('.')}",
@@ -146,7 +146,7 @@ class _Graph:
             ),
         }
         return self.crate.add_workflow(
-            dest_path=part.name, properties=properties, main=True, lang="snakemake"
+            dest_path=source.name, properties=properties, main=True, lang="snakemake"
         )
 
     def _licence(self, spdx: str) -> ContextEntity:
@@ -187,11 +187,11 @@ class _Graph:
         """Say that the workflow has made the results, from its configuration and inputs."""
 
         def of(*roles: Role) -> list[File]:
-            return [entities[each.part.name] for each in files if each.part.role in roles]
+            return [entities[each.file.name] for each in files if each.file.role in roles]
 
         workflow, results = entities[SNAKEFILE], of(Role.RESULT)
         workflow["hasPart"] = [each for each in of(Role.RULES) if each is not workflow]
-        last = max(each.modified for each in files if each.part.is_result)
+        last = max(each.modified for each in files if each.file.is_result)
         self._act(
             "#run",
             f"Run of the workflow: {self.about.title}",
