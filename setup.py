@@ -18,6 +18,8 @@ class BuildRooms(build_py):
     def run(self) -> None:
         shutil.rmtree(Path(self.build_lib) / "carillon", ignore_errors=True)
         super().run()
+        # Crates of runs name the authors and the licence of the software.
+        shutil.copy("CITATION.cff", Path(self.build_lib, *INSTALLED.split("."), "workflow"))
 
     def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
         modules = super().find_package_modules(package, package_dir)

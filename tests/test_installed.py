@@ -126,6 +126,11 @@ def test_rules_are_found_and_planned(site, installed):
     assert "train_forests" in graph
 
 
+def test_crates_of_an_installation_name_the_authors(installed):
+    program = "import carillon; from workflow.crate.citation import citation; print(citation())"
+    assert "The Carillon developers" in installed("-c", program).stdout
+
+
 def test_a_configuration_is_estimated(installed):
     found = installed("-m", "carillon", "estimate", "--preset", "tiny", "--json").stdout
     assert json.loads(found)

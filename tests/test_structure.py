@@ -127,14 +127,15 @@ ARROWS = {
     #
     "workflow.configuration": "dataset_gen dataset_gen.objectives",
     "workflow": "forests workflow.configuration",
+    "workflow.crate": "forests workflow",
     "workflow.estimate": "solver workflow",
     "workflow.report": "solver.files solver.hcms solver.refinement workflow studies.base",
     "workflow.scripts": "workflow.report studies.base",
     "workflow.validation": """solver.files solver.refinement solver.response solver.verification
         workflow workflow.report studies.base""",
     "workflow.commands": """dataset_gen.objectives solver.analysis solver.coarsening
-        solver.correction solver.response workflow workflow.configuration workflow.estimate
-        workflow.report studies.base""",
+        solver.correction solver.response workflow workflow.configuration workflow.crate
+        workflow.estimate workflow.report studies.base""",
     #
     "studies": "",
     "studies.base": "solver.response workflow studies",

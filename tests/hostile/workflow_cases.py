@@ -3,6 +3,7 @@
 import json
 
 from tests.hostile.cases import CLOSED, NO_NUMBERS, NO_WHOLE_NUMBERS, Place, Table
+from tests.hostile.places import KINDS
 from tests.hostile.zoo import CONFIGURATION
 from tests.hostile.zoo_texts import hostile_yaml
 
@@ -129,6 +130,29 @@ each(
     ),
 )
 hostile("digest of nothing", "digest", "paths")
+
+# crate --------------------------------------------------------------------------------------------
+
+RUN = {"r/config.yaml": CONFIGURATION, "r/a.json": "{}"}
+each(
+    "crate", "crate VALUE", "nowhere '' . ZOO ZOO/metal.wav ZOO/odd ZOO/odd/pipe.h5 LONG /dev/null"
+)
+each(
+    "crate's file",
+    "crate r --out VALUE",
+    "'' . r o.tar /dev/null no/o.zip r/a.json LONG.zip",
+    files=RUN,
+)
+each("crate's licence", "crate r --licence VALUE", "'' 'my own' ../../x", "--licence", files=RUN)
+each("crate's creator", "crate r --creator VALUE", "'' ' '", "--creator", files=RUN)
+each("left out", "crate r --leave-out VALUE", "'' . .. /etc nothing LONG", "--leave-out", files=RUN)
+for kind in KINDS[1:]:
+    odd = {"r/odd.txt": Place(kind, "a.json")}
+    hostile(f"crate of a {kind}", "crate r", "r/odd.txt", files={**RUN, **odd})
+hostile("crate of what is no HDF5", "crate r", "r/cut.h5", files={**RUN, "r/cut.h5": "text"})
+for name, content in hostile_yaml().items():
+    hostile(f"crate of {name}", "crate r", files={**RUN, "r/config.yaml": content})
+control("crate", "crate r --out o.zip", "o.zip", files=RUN)
 
 # validate -----------------------------------------------------------------------------------------
 

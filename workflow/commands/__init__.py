@@ -17,6 +17,10 @@ COMMANDS = {
         "workflow.commands.digest",
         "what result files say, as one number: equal for runs that found the same bits",
     ),
+    "crate": Command(
+        "workflow.commands.crate",
+        "a run as one ZIP file for an archive, described as RO-Crate",
+    ),
     "validate": Command(
         "workflow.commands.validate",
         "one solid against ground truth, ending at a page that says how far to trust it",
