@@ -23,8 +23,17 @@ from pathlib import Path
 from typing import Any
 
 from carillon.errors import UserError, one_line
+from carillon.files import system
 from carillon.files.atomic import sync_folder
-from carillon.files.locks import is_at, is_exclusive, is_replaced, machine, take, take_over
+from carillon.files.locks import (
+    is_at,
+    is_exclusive,
+    is_replaced,
+    machine,
+    remove_and_close,
+    take,
+    take_over,
+)
 from carillon.files.paths import cause
 from carillon.processes.slurm_job import is_restarted
 from dataset_gen.settings import settings_from
@@ -49,8 +58,7 @@ def discard_journal(path: Path) -> None:
     if journal_of(path).exists():
         with suppress(UserError):
             file = _locked(journal_of(path))
-            journal_of(path).unlink(missing_ok=True)
-            os.close(file)
+            remove_and_close(journal_of(path), file)
 
 
 class Journal:
@@ -128,8 +136,9 @@ class Journal:
     def close(self, remove: bool = False) -> None:
         """Give up the lock, and the journal if it is to be removed, unless it is another's now."""
         if remove and is_at(self.path, self._file):
-            self.path.unlink(missing_ok=True)
-        os.close(self._file)
+            remove_and_close(self.path, self._file)
+        else:
+            os.close(self._file)
 
     def _read(self) -> int:
         """Read what is there; position after the last good frame, 0 for a new journal."""
@@ -171,7 +180,7 @@ class Journal:
     def _require_new(self) -> None:
         """An older journal may only be cut off within its beginning."""
         beginning = self._beginning()
-        existing = os.pread(self._file, len(beginning) + 1, 0)
+        existing = system.read_at(self._file, len(beginning) + 1, 0)
         if len(existing) > len(beginning) or not _TITLE.startswith(existing[: len(_TITLE)]):
             raise UserError(
                 f"{self.path}: is no journal or damaged at its beginning, so that the work in it "
@@ -213,7 +222,7 @@ class Journal:
         done = 0
         try:
             while done < len(view):
-                done += os.pwrite(self._file, view[done:], self._end + done)
+                done += system.write_at(self._file, view[done:], self._end + done)
         except OSError as error:
             with suppress(OSError):
                 os.ftruncate(self._file, self._end)
@@ -231,10 +240,10 @@ def _frames(file: int, *tags: bytes) -> Iterator[tuple[bytes, bytes, int]]:
     """Tag, content and end of every good frame from the beginning on; only of `tags` if given."""
     size = os.fstat(file).st_size
     position = len(_TITLE)
-    if os.pread(file, position, 0) != _TITLE:
+    if system.read_at(file, position, 0) != _TITLE:
         return
     while size - position >= _FRAME.size:
-        tag, length, checksum = _FRAME.unpack(os.pread(file, _FRAME.size, position))
+        tag, length, checksum = _FRAME.unpack(system.read_at(file, _FRAME.size, position))
         position += _FRAME.size
         if length > size - position:
             return
@@ -251,7 +260,7 @@ def _owner_at(journal: Path) -> str:
     """The process that has a journal, as far as that says so; nothing else is waited for."""
     owner: dict[str, Any] = {}
     with suppress(OSError, ValueError):
-        file = os.open(journal, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
+        file = os.open(journal, os.O_RDONLY | system.REGULAR)
         try:
             for _, content, _ in _frames(file, _OWNER):
                 owner = json.loads(content)
@@ -273,7 +282,7 @@ def _framed(tag: bytes, content: bytes) -> bytes:
 def _read(file: int, length: int, position: int) -> bytes:
     """`length` bytes, fewer only at the end of the file."""
     pieces = []
-    while length > 0 and (piece := os.pread(file, length, position)):
+    while length > 0 and (piece := system.read_at(file, length, position)):
         pieces.append(piece)
         length -= len(piece)
         position += len(piece)

@@ -1,6 +1,5 @@
 """How fast a shard was written or read, and in how much memory: the figures of every run."""
 
-import resource
 import time
 from pathlib import Path
 
@@ -27,5 +26,5 @@ class Speed:
             f"peak memory {peak_memory() / 1e6:,.0f} MB"
         )
         if workers > 1:
-            text += f", of a worker {peak_memory(resource.RUSAGE_CHILDREN) / 1e6:,.0f} MB"
+            text += f", of a worker {peak_memory(children=True) / 1e6:,.0f} MB"
         return text

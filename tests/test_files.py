@@ -16,7 +16,7 @@ import pytest
 
 from carillon import ROOMS
 from carillon.errors import UserError
-from carillon.files import atomic, hdf5
+from carillon.files import hdf5, system
 from carillon.files.atomic import atomic_path
 from carillon.files.hdf5 import create_h5, kind_of, open_h5
 from carillon.files.paths import require_file, require_writable
@@ -243,16 +243,16 @@ def test_a_writer_under_way_is_no_leftover(tmp_path):
 
 
 def test_a_new_file_that_is_taken_for_a_leftover_is_made_anew(tmp_path, monkeypatch):
-    lock = atomic.fcntl.flock
+    lock = system.lock
     taken = []
 
-    def late(file, operation):
+    def late(file, **kind):
         if not taken:
             taken.append(next(tmp_path.iterdir()))
             taken[0].unlink()
-        lock(file, operation)
+        lock(file, **kind)
 
-    monkeypatch.setattr(atomic.fcntl, "flock", late)
+    monkeypatch.setattr(system, "lock", late)
     with atomic_path(tmp_path / "text") as temporary:
         temporary.write_text("whole")
     assert (tmp_path / "text").read_text() == "whole"

@@ -5,11 +5,16 @@ import os
 import pytest
 
 from carillon.errors import UserError
+from carillon.files import open_folder, system
 from carillon.files.held_folder import HeldFolder
 
 
-@pytest.fixture
-def held(tmp_path):
+@pytest.fixture(params=["held open", "by its path"])
+def held(request, tmp_path, monkeypatch):
+    """A folder, also as Windows has it."""
+    if request.param == "by its path":
+        monkeypatch.setattr(open_folder, "CAN_BE_HELD", False)
+        monkeypatch.setattr(system, "RENAMES_OPEN", False)
     (tmp_path / "inner").mkdir()
     found = HeldFolder(tmp_path / "inner")
     yield found
@@ -48,6 +53,7 @@ def test_a_link_that_comes_while_something_is_written_is_not_replaced(held, tmp_
     assert held.names() == ["text"] and not (tmp_path / "elsewhere").exists()
 
 
+@pytest.mark.parametrize("held", ["held open"], indirect=True)
 def test_another_folder_in_its_place_gets_nothing(held, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     held.path.rename(tmp_path / "moved")
@@ -60,6 +66,7 @@ def test_another_folder_in_its_place_gets_nothing(held, tmp_path):
     assert (tmp_path / "moved" / "designs" / "1.h5").read_bytes() == b"mine"
 
 
+@pytest.mark.parametrize("held", ["held open"], indirect=True)
 def test_leftovers_go_and_writers_under_way_stay(held):
     (held.path / ".text.dead.partial").write_text("half")
     with held.writing("text") as first:

@@ -1,6 +1,6 @@
 """Without mpi4py, PETSc and SLEPc everything of one machine runs, and gives the same digits.
 
-The main paths do without what macOS lacks of Linux, too.
+The main paths do without what macOS and Windows lack of Linux, too.
 """
 
 import re
@@ -31,11 +31,23 @@ class Hidden:
 sys.meta_path.insert(0, Hidden())
 """
 """Python runs this at its start where its folder is searched, in all processes of a program."""
-HIDE_LINUX = """
-import builtins, io, os, time
+LACKED_MODULES = ("fcntl",)
+HIDE_SYSTEM = """
+import builtins, io, os, select, signal, time
 
-# What Linux alone has: no other system is at hand to try this on.
-del os.sched_getaffinity, os.O_PATH, time.CLOCK_BOOTTIME
+# What macOS or Windows lack: no such machine is at hand to try this on.
+LACKED = (
+    (os, "O_CLOEXEC O_DIRECTORY O_NOFOLLOW O_NONBLOCK O_PATH fchdir geteuid nice"),
+    (os, "pread pwrite sched_getaffinity"),
+    (select, "poll"),
+    (signal, "SIGHUP pthread_sigmask"),
+    (time, "CLOCK_BOOTTIME"),
+)
+for module, names in LACKED:
+    for name in names.split():
+        delattr(module, name)
+for functions in (os.supports_dir_fd, os.supports_fd, os.supports_effective_ids):
+    functions.clear()
 
 def without_proc(opened):
     def open(file, *arguments, **options):
@@ -56,7 +68,7 @@ os.path.isdir = lambda path: isdir(path) and not str(path).startswith("/proc/")
 def core(tmp_path_factory):
     """Function that runs a program in a folder, where the packages are hidden from it."""
     hidden = tmp_path_factory.mktemp("hidden")
-    program = f"PACKAGES = {CLUSTER}\n{HIDE}{HIDE_LINUX}"
+    program = f"PACKAGES = {(*CLUSTER, *LACKED_MODULES)}\n{HIDE}{HIDE_SYSTEM}"
     (hidden / "sitecustomize.py").write_text(program)
     path = f"{hidden}:{CHECKOUT}"
 

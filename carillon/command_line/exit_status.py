@@ -144,6 +144,8 @@ def _flush() -> None:
 
 def _nobody_reads() -> bool:
     """Whether standard output is a pipe whose reader has seen enough, as in `... | head`."""
+    if not hasattr(select, "poll"):  # Windows
+        return True
     poll = select.poll()
     with suppress(OSError, ValueError):
         poll.register(sys.stdout.fileno(), 0)

@@ -3,15 +3,17 @@
 What killed writers leave under temporary names is removed by the next one.
 """
 
-import fcntl
 import os
 import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
+from typing import IO
 
 from carillon.errors import UserError
+from carillon.files import system
+from carillon.files.open_folder import OpenFolder
 from carillon.files.paths import cause, require_writable, target_of
 
 LONGEST_ENDING = 10
@@ -30,20 +32,22 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     try:
         target = target_of(path)
         _clear(target)
-        handle, temporary = _new_temporary(target)
+        holder, temporary = _new_temporary(target)
         try:
-            yield temporary
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(temporary, 0o666 & ~umask)
-            with open(temporary, "rb+") as stream:
-                os.fsync(stream.fileno())
-            target_of(path)  # refuses what may have come there in the meantime
-            os.replace(temporary, target)
-            sync_folder(target.parent)
+            with holder:
+                yield temporary
+                umask = os.umask(0)
+                os.umask(umask)
+                os.chmod(temporary, 0o666 & ~umask)
+                with open(temporary, "rb+") as stream:
+                    os.fsync(stream.fileno())
+                target_of(path)  # refuses what may have come there in the meantime
+                if not system.RENAMES_OPEN:
+                    holder.close()
+                os.replace(temporary, target)
+                sync_folder(target.parent)
         finally:
             temporary.unlink(missing_ok=True)
-            os.close(handle)
     except OSError as error:
         raise UserError(f"{path}: could not be written ({cause(error)})") from error
 
@@ -59,15 +63,15 @@ def sync_folder(folder: Path) -> None:
 
 
 def _clear(target: Path) -> None:
-    folder = os.open(target.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    folder = OpenFolder(target.parent)
     try:
         remove_leftovers(folder, target.name)
     finally:
-        os.close(folder)
+        folder.close()
 
 
-def _new_temporary(path: Path) -> tuple[int, Path]:
-    """A new file beside `path` and its handle, which holds a lock as long as its writer lives.
+def _new_temporary(path: Path) -> tuple[IO[bytes], Path]:
+    """A new file beside `path`, open as long as its writer lives, which locks it, and its name.
 
     The lock is shared, as HDF5 readers may find the file under its final name before it ends.
     """
@@ -75,9 +79,9 @@ def _new_temporary(path: Path) -> tuple[int, Path]:
     while True:
         handle, name = tempfile.mkstemp(prefix=start, suffix=end, dir=path.parent)
         with suppress(OSError):  # a file system without locks, where leftovers stay
-            fcntl.flock(handle, fcntl.LOCK_SH)
+            system.lock(handle, shared=True)
         if os.path.exists(name):
-            return handle, Path(name)
+            return os.fdopen(handle, "rb"), Path(name)
         os.close(handle)  # another writer took it for a leftover, before it was locked
 
 
@@ -93,26 +97,27 @@ def temporary_name(name: str) -> tuple[str, str]:
     return f".{name}.", f".partial{suffix if len(suffix) <= LONGEST_ENDING else ''}"
 
 
-def remove_leftovers(folder: int, name: str) -> None:
+def remove_leftovers(folder: OpenFolder, name: str) -> None:
     """Remove temporary files of `name` that nobody holds a lock on.
 
     Regular files alone are opened: links, pipes and devices of such names are somebody else's.
-    `folder`: descriptor of the folder that they are in.
     """
     start, end = temporary_name(name)
-    for other in os.listdir(folder):
+    for other in folder.names():
         if other.startswith(start) and other.endswith(end):
             with suppress(OSError):
                 _remove_unlocked(folder, other)
 
 
-def _remove_unlocked(folder: int, name: str) -> None:
-    if not stat.S_ISREG(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode):
+def _remove_unlocked(folder: OpenFolder, name: str) -> None:
+    if not stat.S_ISREG(folder.status(name).st_mode):
         return
-    flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-    file = os.open(name, flags, dir_fd=folder)
+    if not system.RENAMES_OPEN:
+        folder.remove(name)
+        return
+    file = folder.open(name, os.O_RDWR)
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.unlink(name, dir_fd=folder)
+        system.lock(file)
+        folder.remove(name)
     finally:
         os.close(file)

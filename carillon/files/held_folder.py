@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import secrets
-import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -13,14 +11,16 @@ from pathlib import Path
 from typing import IO
 
 from carillon.errors import UserError
+from carillon.files import system
 from carillon.files.atomic import remove_leftovers, temporary_name
+from carillon.files.open_folder import OpenFolder
 from carillon.files.paths import cause, kind_of_mode, require_plain
 
 _MISSING = 0
 
 
 class HeldFolder:
-    """A folder by its descriptor, so that nobody puts another one in its place.
+    """A folder that is held open, so that nobody puts another one in its place.
 
     Names are those of things directly in it. Links in it are never followed: a file that is one is
     neither read nor replaced. What is replaced is another file of that name, never written to in
@@ -35,11 +35,11 @@ class HeldFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        self._folder = OpenFolder(path)
 
     def close(self) -> None:
         """Let go of the folder."""
-        os.close(self._folder)
+        self._folder.close()
 
     def child(self, name: str) -> HeldFolder:
         """The folder `name` in this one, made if there is none.
@@ -48,21 +48,20 @@ class HeldFolder:
         neither made nor opened.
         """
         with suppress(FileExistsError):
-            os.mkdir(_plain(name), dir_fd=self._folder)
+            self._folder.make(_plain(name))
         mode = self._mode(name)
         if not stat.S_ISDIR(mode):
             raise UserError(
                 f"{self.path / name}: is a {kind_of_mode(mode)}, expected a folder; remove it"
             )
-        flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
         folder = HeldFolder.__new__(HeldFolder)
         folder.path = self.path / name
-        folder._folder = os.open(name, flags, dir_fd=self._folder)
+        folder._folder = OpenFolder(name, within=self._folder)
         return folder
 
     def names(self) -> list[str]:
         """Names of all that is in it."""
-        return os.listdir(self._folder)
+        return self._folder.names()
 
     def has(self, name: str) -> bool:
         """Whether anything has this name, a link to nothing included."""
@@ -91,9 +90,8 @@ class HeldFolder:
         Raises UserError if it is missing, something else, or cannot be read.
         """
         self._require_file(name)
-        flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         try:
-            with os.fdopen(os.open(name, flags, dir_fd=self._folder), "rb") as stream:
+            with os.fdopen(self._folder.open(name, os.O_RDONLY), "rb") as stream:
                 yield stream
         except OSError as error:
             raise UserError(f"{self.path / name}: cannot be read ({cause(error)})") from None
@@ -123,15 +121,17 @@ class HeldFolder:
             remove_leftovers(self._folder, name)
             with ExitStack() as ending:
                 temporary, stream = self._new_temporary(name)
-                ending.callback(_close, stream)
                 ending.callback(self.remove, temporary)
+                ending.callback(_close, stream)
                 yield stream
                 stream.flush()
                 os.fsync(stream.fileno())
                 self.require_replaceable(name)  # what may have come there in the meantime
-                os.replace(temporary, name, src_dir_fd=self._folder, dst_dir_fd=self._folder)
+                if not system.RENAMES_OPEN:
+                    stream.close()
+                self._folder.rename(temporary, name)
                 with suppress(OSError):
-                    os.fsync(self._folder)
+                    self._folder.sync()
         except OSError as error:
             raise UserError(f"{self.path / name}: could not be written ({cause(error)})") from error
 
@@ -143,7 +143,7 @@ class HeldFolder:
     def remove(self, name: str) -> None:
         """Remove a name, not what a link of that name leads to."""
         with suppress(FileNotFoundError):
-            os.unlink(_plain(name), dir_fd=self._folder)
+            self._folder.remove(_plain(name))
 
     @contextmanager
     def passing(self, start: str) -> Iterator[Path]:
@@ -152,22 +152,22 @@ class HeldFolder:
         Raises OSError if it cannot be made.
         """
         name = f"{start}{secrets.token_hex(8)}"
-        os.mkdir(_plain(name), 0o700, dir_fd=self._folder)
+        self._folder.make(_plain(name), 0o700)
         try:
             yield self.path / name
         finally:
-            shutil.rmtree(name, ignore_errors=True, dir_fd=self._folder)
+            self._folder.remove_folder(name)
 
     def remove_passing(self, start: str) -> None:
         """Remove folders that killed users of `passing` have left."""
         for name in self.names():
             if name.startswith(start) and stat.S_ISDIR(self._mode(name)):
-                shutil.rmtree(name, ignore_errors=True, dir_fd=self._folder)
+                self._folder.remove_folder(name)
 
     def _mode(self, name: str) -> int:
         """File mode of the entry of a name, links not followed; `_MISSING` if there is none."""
         try:
-            return os.stat(_plain(name), dir_fd=self._folder, follow_symlinks=False).st_mode
+            return self._folder.status(_plain(name)).st_mode
         except FileNotFoundError:
             return _MISSING
         except OSError as error:
@@ -181,13 +181,12 @@ class HeldFolder:
     def _new_temporary(self, name: str) -> tuple[str, IO[bytes]]:
         """A new file and its name; it is locked as long as its writer lives."""
         start, end = temporary_name(name)
-        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         while True:
             temporary = f"{start}{secrets.token_hex(4)}{end}"
             with suppress(FileExistsError):
-                file = os.open(temporary, flags, 0o666, dir_fd=self._folder)
+                file = self._folder.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL)
                 with suppress(OSError):  # a file system without locks, where leftovers stay
-                    fcntl.flock(file, fcntl.LOCK_SH)
+                    system.lock(file, shared=True)
                 if self.has(temporary):
                     return temporary, os.fdopen(file, "wb")
                 os.close(file)  # another writer took it for a leftover, before it was locked
@@ -198,7 +197,7 @@ def _plain(name: str) -> str:
 
     Raises UserError if it does.
     """
-    if not name or name in (".", "..") or "/" in name or "\0" in name:
+    if not name or name in (".", "..") or set(name) & {"/", os.sep, "\0"}:
         raise UserError(f"{name!r}: is no name of a file, expected one without slashes")
     return name
 

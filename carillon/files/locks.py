@@ -6,7 +6,6 @@ with: a copy takes its place (`take_over`), and the other writer's late bytes go
 """
 
 import errno
-import fcntl
 import logging
 import os
 import stat
@@ -16,6 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from carillon.errors import UserError
+from carillon.files import system
 from carillon.files.atomic import sync_folder, temporary_name
 from carillon.files.paths import cause, require_writable
 
@@ -40,18 +40,28 @@ def locked(path: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
+        remove_and_close(name, file)
+
+
+def remove_and_close(name: Path, file: int) -> None:
+    """Remove the file `name` from `take` and give it back; who waits for it makes another one."""
+    if system.RENAMES_OPEN:
         name.unlink(missing_ok=True)
         os.close(file)
+    else:
+        os.close(file)
+        with suppress(OSError):  # another process has opened it since
+            name.unlink(missing_ok=True)
 
 
 def take(name: Path, refusal: str, patient: bool = False) -> int:
     """Open the file `name`, made if need be, for this process alone; closing it gives it back.
 
-    Who removes the file must do so before closing it. If another process has it, the `patient` wait
-    until that has ended. Raises UserError with the sentence `refusal` if another process has it; if
-    it cannot be opened or is no regular file, but a link, pipe or device.
+    Who removes the file does so by `remove_and_close`. If another process has it, the `patient`
+    wait until that has ended. Raises UserError with the sentence `refusal` if another process has
+    it; if it cannot be opened or is no regular file, but a link, pipe or device.
     """
-    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+    flags = os.O_RDWR | os.O_CREAT | system.REGULAR
     while True:
         try:
             file = os.open(name, flags, 0o666)
@@ -73,12 +83,12 @@ def take(name: Path, refusal: str, patient: bool = False) -> int:
 
 def _lock(name: Path, file: int, refusal: str, patient: bool) -> None:
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        system.lock(file)
     except BlockingIOError:
         if not patient:
             raise UserError(refusal) from None
         logger.warning(f"{name}: is held by another process; waiting until that has ended")
-        fcntl.flock(file, fcntl.LOCK_EX)
+        system.lock(file, wait=True)
     except OSError as error:
         if error.errno not in _NO_LOCKS:
             raise UserError(f"{name}: cannot be locked ({cause(error)})") from None
@@ -103,7 +113,7 @@ def is_replaced(name: Path, file: int) -> bool:
 def is_exclusive(file: int) -> bool:
     """Whether the lock of a file from `take` keeps out the other processes of this machine."""
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        system.lock(file)
     except OSError:
         return False
     return True
@@ -121,18 +131,22 @@ def take_over(name: Path, file: int, length: int) -> int:
     """Put a copy of the first `length` bytes in the place of a file from `take`, which it closes.
 
     Returns the copy, locked, which no other process has open. Raises UserError if it cannot be
-    made; the file then stays as it was, and open.
+    made; the file then stays as it was, and open. On Windows it is the file itself, cut off: there
+    the lock keeps out the processes of other machines, too.
     """
+    if not system.RENAMES_OPEN:
+        os.ftruncate(file, length)
+        return file
     start, end = temporary_name(name.name)
     try:
         copy, temporary = tempfile.mkstemp(prefix=start, suffix=end, dir=name.parent)
         try:
             with suppress(OSError):  # a file system without locks
-                fcntl.flock(copy, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                system.lock(copy)
             os.fchmod(copy, stat.S_IMODE(os.fstat(file).st_mode))
             done = 0
-            while done < length and (piece := os.pread(file, min(PIECE, length - done), done)):
-                done += os.pwrite(copy, piece, done)
+            while piece := system.read_at(file, min(PIECE, length - done), done):
+                done += system.write_at(copy, piece, done)
             os.fsync(copy)
             os.replace(temporary, name)
         except BaseException:

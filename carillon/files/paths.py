@@ -22,12 +22,17 @@ _OTHER_KINDS = (
     (stat.S_ISFIFO, "pipe"),
     (stat.S_ISSOCK, "socket"),
 )
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_NO_ROOM = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
+
+
+def user() -> int:
+    """Number of this user; 0, which `lstat` tells of all files there, where users have none."""
+    return os.geteuid() if hasattr(os, "geteuid") else 0
 
 
 def is_own(status: os.stat_result, is_kind: Callable[[int], bool]) -> bool:
     """Whether what `lstat` tells of is of a kind, as by `stat.S_ISDIR`, and this user's."""
-    return is_kind(status.st_mode) and status.st_uid == os.geteuid()
+    return is_kind(status.st_mode) and status.st_uid == user()
 
 
 def first_line(error: BaseException) -> str:
@@ -39,7 +44,7 @@ def first_line(error: BaseException) -> str:
 def cause(error: OSError) -> str:
     """What the operating system said, in one line, and what to do if there is no room left."""
     text = error.strerror if error.errno and error.strerror else first_line(error)
-    if error.errno in _NO_ROOM:
+    if error.errno and error.errno in _NO_ROOM:
         text = os.strerror(error.errno)
         return f"{text}; make room and run the same command again"
     return text

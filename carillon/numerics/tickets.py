@@ -5,6 +5,7 @@ threads that are at work have taken: so it never waits for a thread that has not
 thread by itself does all the work.  Who does a ticket changes nothing in what comes out.
 """
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,9 @@ compiled = compiler(Path(__file__))
 PATIENCE = 2000
 """Looks at a counter before the core is offered to others."""
 
-_give_way = types.ExternalFunction("sched_yield", types.intc())
+_give_way = types.ExternalFunction(
+    "SwitchToThread" if os.name == "nt" else "sched_yield", types.intc()
+)
 
 
 def _address(context: Any, builder: Any, kind: Any, counters: Any, number: Any) -> Any:

@@ -21,6 +21,7 @@ from threading import Thread
 from typing import Any, TypeVar
 
 from carillon.processes.mpi_environment import leave_nothing, no_rank
+from carillon.processes.signals import endings_held_back
 
 Result = TypeVar("Result")
 
@@ -64,8 +65,13 @@ def run_child(
     return subprocess.CompletedProcess(child.args, child.returncode, out, said)
 
 
-def _tied_to(parent: int) -> Callable[[], None]:
-    """What the child does before it becomes the program; it can neither import nor lock there."""
+def _tied_to(parent: int) -> Callable[[], None] | None:
+    """What the child does before it becomes the program; it can neither import nor lock there.
+
+    None on Windows, where it cannot do anything.
+    """
+    if os.name == "nt":
+        return None
     # Only Linux has it. Elsewhere the program goes on until it is told to end.
     control = getattr(ctypes.CDLL(None, use_errno=True), "prctl", None)
 
@@ -188,13 +194,10 @@ def _join(manager: Thread, tasks: Connection) -> None:
 @contextmanager
 def _quietly() -> Iterator[None]:
     """Processes started in the body hear no signal that asks to stop, and are no MPI ranks."""
-    ensure_running()  # of Python's own, which lets the signals through once it is started
-    signals = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-    try:
-        with no_rank(os.environ):
-            yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, signals)
+    if os.name != "nt":
+        ensure_running()  # of Python's own, which lets the signals through once it is started
+    with endings_held_back(), no_rank(os.environ):
+        yield
 
 
 def _begin(prepare: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:

@@ -26,7 +26,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from carillon.files.paths import is_own
+from carillon.files.paths import is_own, user
+from carillon.files.system import may_write
 from carillon.processes.loading import while_loading
 
 logger = logging.getLogger(__name__)
@@ -102,7 +103,7 @@ def private_folder() -> Path | None:
     What others could write is not used: kernels in it are code that would be run.
     """
     for place in filter(None, (os.environ.get("TMPDIR"), *PLACES)):
-        folder = Path(place).absolute() / f"{FOLDER}-{os.geteuid()}"
+        folder = Path(place).absolute() / f"{FOLDER}-{user()}"
         with suppress(OSError):
             folder.mkdir(mode=0o700, exist_ok=True)
             status = folder.lstat()
@@ -227,7 +228,7 @@ def _can_be_made(folder: str) -> bool:
         return False
     while not os.path.lexists(folder):
         folder = os.path.dirname(folder)
-    return os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK, effective_ids=True)
+    return os.path.isdir(folder) and may_write(folder)
 
 
 def _say(sentence: str) -> None:

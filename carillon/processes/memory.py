@@ -2,10 +2,13 @@
 
 import ctypes
 import os
-import resource
 import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
+
+from carillon.files.system import optional
+from carillon.processes import windows_memory
 
 FIRST_TO_GO = 500
 """Kernel score of the process, at most 1000: the highest is ended first without memory."""
@@ -16,10 +19,13 @@ GROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGEST_KEPT = 1 << 28
 _NEVER = (1 << 31) - 1
+_resource = optional("resource")
 
 
 def memory_bytes(group_limit: Path = GROUP_LIMIT) -> int:
     """Memory of the machine, or what the control group of this process allows if that is less."""
+    if os.name == "nt":
+        return windows_memory.machine()[0]
     machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     try:
         return min(machine, int(group_limit.read_text()))
@@ -27,9 +33,16 @@ def memory_bytes(group_limit: Path = GROUP_LIMIT) -> int:
         return machine
 
 
-def peak_memory(who: int = resource.RUSAGE_SELF) -> int:
-    """Largest resident memory [bytes] so far of this process, or as `resource.RUSAGE_*` say."""
-    largest = resource.getrusage(who).ru_maxrss
+def peak_memory(children: bool = False) -> int:
+    """Largest resident memory [bytes] so far of this process.
+
+    Of the largest of its `children` that have ended, if they are asked for; Windows does not tell
+    that, so that it is 0.
+    """
+    if os.name == "nt":
+        return 0 if children else windows_memory.peak()
+    who = _resource.RUSAGE_CHILDREN if children else _resource.RUSAGE_SELF
+    largest: int = _resource.getrusage(who).ru_maxrss
     return largest if sys.platform == "darwin" else 1024 * largest
 
 
@@ -38,6 +51,8 @@ def available_memory() -> int | None:
 
     None where the system does not tell.
     """
+    if os.name == "nt":
+        return windows_memory.machine()[1]
     known = []
     with suppress(OSError, ValueError):
         known.append(_field("/proc/meminfo", "MemAvailable:"))
@@ -63,7 +78,7 @@ def reuse_freed_memory() -> None:
     as a sparse product.  Those beyond 256 MB live longer, and are given back: what is kept of them
     others do not fit into.  Only the GNU C library is told; elsewhere nothing happens.
     """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    mallopt = _of_c_library("mallopt")
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, _LARGEST_KEPT)
         mallopt(_M_TRIM_THRESHOLD, _NEVER)
@@ -75,9 +90,14 @@ def give_back_freed_memory() -> None:
     For the end of a phase whose blocks the next one has no use for, and before something asks how
     much is free. Only the GNU C library is told.
     """
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    trim = _of_c_library("malloc_trim")
     if trim is not None:
         trim(0)
+
+
+def _of_c_library(name: str) -> Any:
+    """A function of the C library that this process has; None if it has no such function."""
+    return None if os.name == "nt" else getattr(ctypes.CDLL(None), name, None)
 
 
 def spare_the_machine() -> None:
@@ -86,7 +106,10 @@ def spare_the_machine() -> None:
     What asks for more than twice what there is gets a MemoryError at once, which is a sentence to
     the person; else the kernel, once nothing is left, ends this process before the person's others.
     So much is asked for by no work that could be done, also where memory is reserved and not used.
+    Windows has no such limits.
     """
+    if os.name == "nt":
+        return
     with suppress(OSError, ValueError):
         score = Path("/proc/self/oom_score_adj")
         score.write_text(str(max(FIRST_TO_GO, int(score.read_text()))))
@@ -99,10 +122,10 @@ def require_less_than(room: int) -> None:
     Unlike a limit of addresses (RLIMIT_AS) this leaves out files, libraries and what is shared.
     """
     with suppress(OSError, ValueError):  # a limit that is lower already
-        least, most = resource.getrlimit(resource.RLIMIT_DATA)
+        least, most = _resource.getrlimit(_resource.RLIMIT_DATA)
         limit = _field("/proc/self/status", "VmData:") + room
-        if least == resource.RLIM_INFINITY or limit < least:
-            resource.setrlimit(resource.RLIMIT_DATA, (limit, most))
+        if least == _resource.RLIM_INFINITY or limit < least:
+            _resource.setrlimit(_resource.RLIMIT_DATA, (limit, most))
 
 
 def _swap() -> int:

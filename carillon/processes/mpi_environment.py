@@ -15,12 +15,14 @@ Likewise `mpiexec` of another MPI. Such ranks do not know each other, and are to
 """
 
 import os
+import platform
 import shutil
 import stat
 from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager, suppress
 
-from carillon.files.paths import is_own
+from carillon.files.paths import is_own, user
+from carillon.files.system import may_write
 from carillon.processes.loading import while_loading
 
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
@@ -109,14 +111,14 @@ def keep_apart(environment: MutableMapping[str, str], process: int) -> None:
 
 
 def _name(process: int) -> str:
-    return f"{_OWN}.{os.uname().nodename}.{os.getuid()}.{process}."
+    return f"{_OWN}.{platform.node()}.{user()}.{process}."
 
 
 def _temporary_folder(environment: Mapping[str, str]) -> str:
     given = (environment.get("OMPI_MCA_orte_tmpdir_base"), environment.get("TMPDIR"))
     folders = [*filter(None, given), "/tmp", "/var/tmp", "/dev/shm"]
     for each in folders:
-        if os.path.isdir(each) and os.access(each, os.W_OK | os.X_OK, effective_ids=True):
+        if os.path.isdir(each) and may_write(each):
             return each
     try:
         return os.getcwd()

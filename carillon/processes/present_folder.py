@@ -59,7 +59,7 @@ def ignore_modules(environment: MutableMapping[str, str], path: Sequence[str]) -
 def elsewhere() -> Iterator[None]:
     """Another present folder, of all threads, in the body; not where this one cannot be entered."""
     try:
-        here = os.open(".", getattr(os, "O_PATH", os.O_RDONLY) | os.O_DIRECTORY)
+        here = _here()
     except OSError:  # then nothing in it can be read either
         yield
         return
@@ -67,8 +67,16 @@ def elsewhere() -> Iterator[None]:
         os.chdir(_ELSEWHERE)
         yield
     finally:
-        os.fchdir(here)
-        os.close(here)
+        os.chdir(here)
+        if isinstance(here, int):
+            os.close(here)
+
+
+def _here() -> int | str:
+    """The present folder held open, or its path where no folder can be."""
+    if os.chdir in os.supports_fd:
+        return os.open(".", getattr(os, "O_PATH", os.O_RDONLY) | os.O_DIRECTORY)
+    return os.getcwd()
 
 
 @contextmanager

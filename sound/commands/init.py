@@ -195,7 +195,8 @@ def _seen_from(folder: Path, path: str) -> str:
 def _sentence(options: InitOptions, path: Path, surface: Surface) -> str:
     from carillon.fem.geometry.size import lengths_in_words
 
-    run = shlex.join(["carillon", "design", str(path), "--out", str(path.with_suffix(".h5"))])
+    out = path.with_suffix(".h5").as_posix()
+    run = shlex.join(["carillon", "design", path.as_posix(), "--out", out])
     solid = f"{path}: a project of {options.mesh}, {lengths_in_words(surface.extents)}"
     if options.clips is not None:
         return f"{solid}; next: {run}"

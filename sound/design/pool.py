@@ -14,7 +14,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
 from multiprocessing.queues import SimpleQueue
-from tempfile import NamedTemporaryFile, TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from threading import Thread
 from typing import IO
 
@@ -75,8 +75,9 @@ class Pool:
         if os.path.isdir("/proc/self/fd"):
             file = self._held.enter_context(TemporaryFile())
             return file, f"/proc/{os.getpid()}/fd/{file.fileno()}"
-        named = self._held.enter_context(NamedTemporaryFile())
-        return named.file, named.name
+        folder = self._held.enter_context(TemporaryDirectory())
+        named = self._held.enter_context(open(os.path.join(folder, "setting"), "wb"))
+        return named, named.name
 
     @property
     def seconds(self) -> float:

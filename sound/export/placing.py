@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from carillon.errors import UserError
 from carillon.files.held_folder import HeldFolder
 from carillon.files.paths import cause, require_plain
+from carillon.processes.signals import endings_held_back
 
 LARGEST_TABLE = 64 * 2**20
 """Length [bytes] of a table that is read."""
@@ -55,7 +55,7 @@ class Filling:
         """
         folder = self._folder
         _require_places(folder, self._table, files)
-        with _unstopped():
+        with endings_held_back():
             former = _former(folder, self._table)
             removed = _removed(folder, [each for each in former if each not in set(files)])
             for file in files:
@@ -171,13 +171,3 @@ def _inside(folder: HeldFolder, name: str) -> Iterator[HeldFolder | None]:
             yield inner
         finally:
             inner.close()
-
-
-@contextmanager
-def _unstopped() -> Iterator[None]:
-    """Signals that end the process wait until the end."""
-    former = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, former)

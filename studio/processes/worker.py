@@ -175,7 +175,8 @@ class Worker:
 
 
 def _serve(pipe: Connection, work: str) -> None:
-    os.nice(NICER)
+    if hasattr(os, "nice"):
+        os.nice(NICER)
     os.environ["OMP_NUM_THREADS"] = "1"
     module, name = work.split(":")
     done = getattr(import_module(module), name)()

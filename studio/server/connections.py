@@ -1,13 +1,14 @@
 """Who is connected: few at a time, and who has not been let in goes first."""
 
 import asyncio
-import resource
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+from carillon.files.system import optional
 
 BURST = 16
 """Connections that are accepted at once, before any of them is looked at."""
@@ -93,6 +94,9 @@ class Connections:
 
 def most_connections(requested: int) -> int:
     """Connections that may be open at a time, so that descriptors are left for files."""
+    resource = optional("resource")
+    if resource is None:  # Windows, which has no such limit
+        return requested
     allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if allowed == resource.RLIM_INFINITY:
         return requested

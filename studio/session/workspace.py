@@ -1,7 +1,6 @@
 """The folder that a studio works in: meshes, clips, projects, and what it keeps for itself."""
 
 import json
-import os
 import re
 import shutil
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from typing import Any
 from carillon.command_line.counts import counted
 from carillon.errors import UserError, one_line
 from carillon.files.held_folder import HeldFolder
-from carillon.files.locks import take
+from carillon.files.locks import remove_and_close, take
 from carillon.files.paths import cause, require_plain
 from carillon.files.yaml_input import MOST_BYTES, parse_yaml, read_yaml
 from sound.heads.head_space import head_files
@@ -81,8 +80,7 @@ class Workspace:
 
     def close(self) -> None:
         """Let another studio have the folder."""
-        self._own.remove(_LOCK)
-        os.close(self._lock)
+        remove_and_close(self._own.path / _LOCK, self._lock)
         self._ending.close()
 
     def path(self, name: str) -> Path:
