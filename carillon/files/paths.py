@@ -80,7 +80,7 @@ def require_writable(path: str | Path, inputs: Iterable[str | Path] = ()) -> Pat
     the folder is missing or not writable, or something else than a regular file is there: a folder,
     device, pipe or socket.
     """
-    if str(path).endswith(os.sep):
+    if str(path).endswith(("/", os.sep)):
         raise UserError(f"{path}: names a folder, expected the name of a file to write")
     path = Path(path)
     require_plain(path)

@@ -6,6 +6,7 @@ nothing that another task has done.  So results do not depend on how many proces
 
 import os
 import pickle
+import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, wait
@@ -72,7 +73,7 @@ class Pool:
 
         Where the system gives none to files without a name, it has one.
         """
-        if os.path.isdir("/proc/self/fd"):
+        if sys.platform == "linux" and os.path.isdir("/proc/self/fd"):
             file = self._held.enter_context(TemporaryFile())
             return file, f"/proc/{os.getpid()}/fd/{file.fileno()}"
         folder = self._held.enter_context(TemporaryDirectory())

@@ -45,7 +45,7 @@ def format_of(out: str, named: str | None = None) -> str:
     Raises UserError if the two contradict each other, or neither tells one.
     """
     ending = Path(out).suffix.lstrip(".").lower()
-    if named is None and out.endswith(os.sep):
+    if named is None and out.endswith(("/", os.sep)):
         named = FOLDER
     if named is not None and ending in FORMATS and ending != named:
         asked = f"--format is {named}" if named != FOLDER else "a folder is asked for"
