@@ -34,6 +34,8 @@ setup(
         *(f"{INSTALLED}.{name}" for name in rooms),
     ],
     package_dir={f"{INSTALLED}.{room}": room for room in ROOMS},
+    # What an sdist holds beside the packages is no part of the wheel.
+    include_package_data=False,
     package_data={
         "": [*DATA, *PAGES],
         f"{INSTALLED}.forests": ["default.h5"],

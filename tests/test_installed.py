@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+import tarfile
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,26 +16,46 @@ from tests.programs import CHECKOUT, python, run
 
 pytestmark = pytest.mark.nightly
 
+PIP = (sys.executable, "-m", "pip", "--quiet", "--no-input")
+
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """A folder with the wheel unpacked, as an installation has it."""
-    folder = tmp_path_factory.mktemp("installed")
-    pip = [sys.executable, "-m", "pip", "--quiet", "--no-input"]
+def sdist(tmp_path_factory):
+    """An sdist of the checkout, and the names of its files."""
+    folder = tmp_path_factory.mktemp("sdist")
     # From a copy: setuptools leaves its traces in the folder that it builds.
     copy = folder / "copy"
     words = "git ls-files -z --cached --others --exclude-standard".split()
-    files = run(*words, cwd=CHECKOUT, check=True).stdout
-    for name in filter(None, files.split("\0")):
-        if (CHECKOUT / name).exists() and not name.startswith("tests/"):
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            (copy / name).write_bytes((CHECKOUT / name).read_bytes())
+    listed = filter(None, run(*words, cwd=CHECKOUT, check=True).stdout.split("\0"))
+    names = [name for name in listed if (CHECKOUT / name).exists()]
+    for name in names:
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).write_bytes((CHECKOUT / name).read_bytes())
+    build = f"from setuptools.build_meta import build_sdist; build_sdist({str(folder)!r})"
+    tools = folder / "tools"
+    needed = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["build-system"]["requires"]
+    subprocess.run([*PIP, "install", "--target", tools, *needed], check=True, timeout=HANG_SECONDS)
+    python("-c", build, cwd=copy, env={**os.environ, "PYTHONPATH": str(tools)}, check=True)
+    return next(folder.glob("*.tar.gz")), names
+
+
+def test_the_sdist_is_the_checkout(sdist):
+    archive, names = sdist
+    with tarfile.open(archive) as files:
+        held = {name.partition("/")[2] for name in files.getnames()}
+    assert set(names) <= held
+
+
+@pytest.fixture(scope="module")
+def site(sdist, tmp_path_factory):
+    """A folder with the wheel of the sdist unpacked, as an installation has it."""
+    folder = tmp_path_factory.mktemp("installed")
     for words in (
-        ["wheel", "--no-deps", "--wheel-dir", folder, copy],
+        ["wheel", "--no-deps", "--wheel-dir", folder, sdist[0]],
         ["install", "--no-deps", "--no-index", "--target", folder / "site"],
     ):
         wheels = [] if words[0] == "wheel" else list(folder.glob("*.whl"))
-        subprocess.run([*pip, *map(str, [*words, *wheels])], check=True, timeout=HANG_SECONDS)
+        subprocess.run([*PIP, *map(str, [*words, *wheels])], check=True, timeout=HANG_SECONDS)
     return folder / "site"
 
 
