@@ -1,6 +1,7 @@
 """`sound init`: a project with all keys in it, which is a project as it is."""
 
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -16,6 +17,7 @@ from sound.clips.targets import MOST_MODES
 from sound.design.preparation import targets_of
 from sound.project.design_file import read_design
 from sound.project.project import Project, load_project, project_of
+from studio.session import open_studio
 
 SCHEMA = schema_of(Project)
 _KEY_BEHIND_A_MARK = re.compile(r"^( *)#( *[a-z_]+:)", re.MULTILINE)
@@ -90,6 +92,9 @@ def test_a_design_is_made_of_it_as_it_is(here):
     assert main(["design", "bar.yaml", "--evaluations", "2", "--out", "bar.h5"]) == 0
     design = read_design("bar.h5")
     assert design.settings["modes"] == len(design.frequencies) <= MOST_MODES
+    session = open_studio("bar.h5", here).session
+    session.workspace.close()
+    assert session.document.settings.get("modes", "auto") == "auto"
 
 
 def test_a_design_of_a_number_of_modes_is_gone_on_from_with_all(here):
@@ -101,6 +106,7 @@ def test_a_design_of_a_number_of_modes_is_gone_on_from_with_all(here):
         design = read_design("bar.h5")
         assert design.settings["modes"] == len(design.frequencies)
         assert len(design.frequencies) == 3 or name == "bar"
+        assert design.asked["modes"] == (3 if name == "three" else "auto")
     assert len(design.targets.sounding) + len(design.targets.left_out) == 5
     assert design.history["evaluations"].tolist()[-1] == 2
 
@@ -112,6 +118,36 @@ def test_files_are_named_as_the_project_sees_them(here):
     project = load_project(here / "projects" / "project.yaml")
     assert project.targets[0].name == "läute 鐘"
     assert Path(project.targets[0].clip).resolve() == here.resolve() / "läute 鐘.wav"
+
+
+def test_a_folder_that_is_made_has_all_that_its_project_names(here, capsys):
+    trimesh.creation.box((0.1, 0.02, 0.02)).export("Bär.stl")
+    (here / "other").mkdir()
+    shutil.copy("wood.wav", "other/metal.wav")
+    clips = ["metal.wav", str(here / "other" / "metal.wav")]
+    assert main(["init", "given", "--mesh", "Bär.stl", "--clips", *clips]) == 0
+    assert "with copies of Bär.stl and metal.wav and metal-2.wav" in capsys.readouterr().out
+    assert sorted(os.listdir("given")) == ["Bär.stl", "metal-2.wav", "metal.wav", "project.yaml"]
+    assert (here / "given" / "metal-2.wav").read_bytes() == (here / "wood.wav").read_bytes()
+    shutil.move("given", "moved")
+    project = load_project(here / "moved" / "project.yaml")
+    assert [Path(each.clip).name for each in project.targets] == ["metal.wav", "metal-2.wav"]
+    open_studio(str(here / "moved" / "project.yaml"), here / "moved").session.workspace.close()
+
+
+def test_a_mesh_that_names_others_stays_where_it_is(here):
+    trimesh.creation.box((0.1, 0.02, 0.02)).export("bar.gltf")
+    assert main(["init", "gltf", "--mesh", "bar.gltf", "--unit", "m"]) == 0
+    assert yaml.safe_load(Path("gltf/project.yaml").read_text())["mesh"] == "../bar.gltf"
+
+
+def test_a_folder_that_cannot_be_filled_is_not_left(here, refuses, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(shutil, "copyfile", full)
+    said = refuses(main, "init", "full", "--mesh", "builtin:bar", "--clips", "metal.wav")
+    assert "full: could not be written (No space left" in said and not os.path.exists("full")
 
 
 def test_without_a_clip_one_is_to_be_recorded(here, capsys):

@@ -13,6 +13,7 @@ from carillon.parameters import REQUIRED, option, parameters
 from carillon.parameters.command_line import add_options, collect
 from carillon.parameters.quantities import MetresPerUnit, UpAxis, WallThickness
 from sound.clips.formats import CLIP_FORMATS
+from sound.project.files import ProjectFiles
 
 ENDINGS = (".yaml", ".yml")
 """Endings of the names of project files."""
@@ -65,24 +66,24 @@ def run(arguments: argparse.Namespace) -> int:
     from sound.project.template import project_text
 
     options = collect(InitOptions, arguments)
-    path = _writable(options.path or ".")
-    values = _solid(options, path.parent)
+    path, is_new = _writable(options.path or ".")
+    files = ProjectFiles(path.parent, is_new)
+    values = _solid(options, files)
     surface = _surface(options.mesh, values)
-    values["targets"] = _targets(options, surface, path.parent)
+    values["targets"] = _targets(options, surface, files)
     heard = _heard(options)
     text = project_text(values)
     project_of(parse_yaml(text), path.parent)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_path(path) as temporary:
+    with files.written(), atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    print(_sentence(options, path, surface))
+    print(_sentence(options, path, surface, files))
     for line in heard:
         print(line)
     return 0
 
 
-def _writable(path: str) -> Path:
-    """The file to write, in a folder that is there or will be, or of its own name."""
+def _writable(path: str) -> tuple[Path, bool]:
+    """The file to write, and whether its folder has to be made."""
     from carillon.files.paths import require_writable
     from sound.outputs import require_output
 
@@ -92,18 +93,18 @@ def _writable(path: str) -> Path:
         raise UserError(f"{file}: is there already; name another file, or remove it first")
     if is_new:
         require_writable(str(file.parent))
-        return file
-    return require_output(file, ENDINGS)
+        return file, True
+    return require_output(file, ENDINGS), False
 
 
-def _solid(options: InitOptions, folder: Path) -> dict[str, Any]:
+def _solid(options: InitOptions, files: ProjectFiles) -> dict[str, Any]:
     """Keys of the project that say what the solid is."""
     from carillon.builtin_names import BUILTIN_PREFIX
     from carillon.fem.geometry.turning import up_of_format
     from carillon.parameters.quantities import unit_in_words
 
     builtin = options.mesh.startswith(BUILTIN_PREFIX)
-    values: dict[str, Any] = {"mesh": options.mesh if builtin else _seen_from(folder, options.mesh)}
+    values: dict[str, Any] = {"mesh": options.mesh if builtin else files.named(options.mesh)}
     if options.unit != 1.0:
         values["unit"] = unit_in_words(options.unit)
     up = options.up or up_of_format(options.mesh)
@@ -129,10 +130,10 @@ def _surface(mesh: str, values: Mapping[str, Any]) -> Surface:
     return surface
 
 
-def _targets(options: InitOptions, surface: Surface, folder: Path) -> list[dict[str, Any]]:
+def _targets(options: InitOptions, surface: Surface, files: ProjectFiles) -> list[dict[str, Any]]:
     if options.clips is None:
         return _at_points(surface, [PLACEHOLDER], options.unit)
-    clips = [_seen_from(folder, clip) for clip in options.clips]
+    clips = [files.named(clip) for clip in options.clips]
     targets = _at_points(surface, clips, options.unit)
     if options.allow_clipped:
         targets = [target | {"allow_clipped": True} for target in targets]
@@ -184,20 +185,14 @@ def _heard(options: InitOptions) -> list[str]:
     return lines
 
 
-def _seen_from(folder: Path, path: str) -> str:
-    """Name of a file in a project that lies in `folder`; an absolute one stays as it is."""
-    if os.path.isabs(path):
-        return path
-    own = Path(path)
-    return os.path.relpath(own.parent.resolve() / own.name, folder.resolve())
-
-
-def _sentence(options: InitOptions, path: Path, surface: Surface) -> str:
+def _sentence(options: InitOptions, path: Path, surface: Surface, files: ProjectFiles) -> str:
     from carillon.fem.geometry.size import lengths_in_words
 
     out = path.with_suffix(".h5").as_posix()
     run = shlex.join(["carillon", "design", path.as_posix(), "--out", out])
     solid = f"{path}: a project of {options.mesh}, {lengths_in_words(surface.extents)}"
+    if files.copied:
+        solid += f", with copies of {' and '.join(files.copied)}"
     if options.clips is not None:
         return f"{solid}; next: {run}"
     return f"{solid}; record a strike as {path.parent / PLACEHOLDER}, then: {run}"

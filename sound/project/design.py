@@ -17,6 +17,7 @@ from carillon.fem.geometry.walls import ABOUT, SIDES, WallSize
 from carillon.fem.model import ElasticModel, Solid
 from carillon.fem.regions import RegionOf
 from carillon.parameters.quantities import UP_AXES
+from solver.analysis.problem import AUTO
 from solver.files.modes_file import frequencies
 from sound.clips.targets import Targets
 from sound.project.build_evidence import is_build, is_number
@@ -110,6 +111,12 @@ class Design:
         """What the solid is called: the name of its mesh, without folders."""
         mesh = str(self.settings.get("mesh", "")) or "solid"
         return PurePath(mesh.removeprefix("builtin:")).stem or "solid"
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """The project as it was asked for: `modes` are auto if they came from what is heard."""
+        heard = self.targets.left_out is not None
+        return {**self.settings, "modes": AUTO} if heard else dict(self.settings)
 
     @property
     def unit(self) -> float:

@@ -12,7 +12,6 @@ from carillon.fem.geometry.surface import surface_name
 from carillon.files.hdf5 import kind_of
 from carillon.limits import MESH_BYTES
 from carillon.parameters.documents import parameters_from
-from solver.analysis.problem import AUTO
 from sound.project.design_file import read_design
 from sound.project.project import Project
 from studio.session.document import Document, document_of, files_of
@@ -137,10 +136,7 @@ def _of_design(path: Path, workspace: Workspace) -> Document:
     """The project that a design was made for, with its material."""
     if kind_of(path, "a Carillon design (HDF5)")[0] != "design":
         raise UserError(f"{path}: is no design, expected one that carillon design wrote")
-    design = read_design(path)
-    settings = dict(design.settings)
-    if design.targets.left_out is not None:  # partials had their modes by the solid
-        settings["modes"] = AUTO
+    settings = read_design(path).asked
     try:
         parameters_from(settings, Project)
     except UserError as error:
