@@ -950,6 +950,11 @@ class Sound:
         samples = _numbers("samples", self.samples, 2, "samples (s,)")
         if not np.isfinite(samples).all():
             raise UserError("samples: found NaN or infinity, expected finite numbers")
+        if samples.ndim == 2 and samples.shape[1] > samples.shape[0]:
+            raise UserError(
+                f"samples: found {samples.shape[0]:,} samples of {samples.shape[1]:,} channels, "
+                "expected (s,) or (s, c), channels last; transpose them"
+            )
         object.__setattr__(self, "samples", samples)
         object.__setattr__(self, "rate", checked("rate", self.rate, SampleRate))
 

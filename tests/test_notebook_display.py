@@ -288,6 +288,8 @@ def test_sounds_are_read_and_written(tmp_path):
     for samples, rate in (([], 48_000), ([np.nan], 48_000), (["a"], 48_000), ([0.0], 5)):
         with pytest.raises(ca.UserError):
             ca.Sound(samples, rate)
+    with pytest.raises(ca.UserError, match="2 samples of 100 channels.*transpose"):
+        ca.Sound(np.zeros((2, 100)))
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
-from snakemake.utils import update_config
-
 from carillon.builtin_names import BUILTIN_NAMES, BUILTIN_PREFIX
 from carillon.errors import UserError
 from carillon.fem.materials import NAMES as MATERIALS
@@ -48,6 +46,8 @@ def complete(files: Iterable[str | Path], given: Values = MappingProxyType({})) 
     given
         Values that take precedence over all files.
     """
+    from snakemake.utils import update_config
+
     files = list(files)
     config: dict[str, Any] = {}
     for values in (*(read_yaml(file, CONFIGURATION) for file in files), given):

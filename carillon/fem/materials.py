@@ -82,7 +82,8 @@ def young_modulus(
             return draw(*NOISE_YOUNG, count)
     if not os.path.exists(name):
         raise UserError(
-            f"material {name!r} is neither a file nor one of the names {', '.join(NAMES)}"
+            f"material {name!r} is neither a file nor one of the names {', '.join(NAMES)}; "
+            "steel, glass, oak and the like are materials of regions (--regions)"
         )
     path = require_file(name, "a material, a file of moduli")
     if not _is_cell_file(name):

@@ -48,7 +48,7 @@ def require(package: str, what: str, instead: str) -> None:
     if missing:
         raise UserError(
             f"{what} needs {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} "
-            f"not installed; {install()}, or {instead}"
+            f"not installed; {instead}, or {install()}"
         )
 
 

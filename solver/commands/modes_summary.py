@@ -24,6 +24,9 @@ REFINED = {FINE_BLOCKS: "blocks fine", DIVIDED_CELLS: "cells divided"}
 """Words for what is counted as refined."""
 LOWEST_HEARD = 20.0
 """Lowest frequency that is heard [Hz]."""
+FAR = 0.05
+"""Expected distance of the frequencies from the solid's, rms, above which advice is given."""
+NEARER = "; a larger --resolution comes nearer, and --accuracy 0.01 finds which"
 EXPECTED = {FROM_FINE: "error against the voxels", FROM_SOLID: "distance from the solid"}
 """Words for the expected errors."""
 
@@ -122,7 +125,8 @@ def print_summary(attributes: dict[str, Any], solved: Solved, out: str) -> None:
     )
     for prefix, words in EXPECTED.items():
         if f"{prefix}_rms" in attributes:
-            print(f"expected {words} {in_words(attributes, prefix)}{counts}")
+            far = attributes[f"{prefix}_rms"] > FAR and prefix == FROM_SOLID
+            print(f"expected {words} {in_words(attributes, prefix)}{counts}{NEARER if far else ''}")
     if "missed_accuracy" in attributes:
         rms = 100.0 * attributes["missed_accuracy"]
         print(
