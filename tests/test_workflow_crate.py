@@ -201,6 +201,25 @@ def test_inputs_of_one_name_are_all_in_the_crate(results):
     assert files["inputs/my bar-2.obj"] == b"v 0 0 0\n"
 
 
+def write_record(path: Path, parameters: dict, **more: object) -> None:
+    """Write a JSON result whose record has such parameters."""
+    path.write_text(json.dumps({"provenance": provenance.record(parameters) | more}))
+
+
+def test_names_that_are_no_text_are_escaped(results):
+    folder = Path(os.fsdecode(b"d\xff"))
+    folder.mkdir()
+    (folder / "box.obj").write_bytes(b"v 0 0 0\n")
+    command = f"carillon modes {folder}/box.obj"
+    write_record(
+        results / "of_box.json", {"mesh": f"{folder}/box.obj"}, command=command, commit="\ud800"
+    )
+    known = entities(crate(results))
+    assert known["inputs/box.obj"]["alternateName"] == r"d\udcff/box.obj"
+    told = known["#made-results/of_box.json"]["description"]
+    assert r"d\udcff/box.obj" in told and r"commit \ud800" in told
+
+
 def test_roles_follow_the_folders(results):
     roles = {part.name: part.role for part in results_of(results)}
     assert roles["results/config.yaml"] is Role.CONFIGURATION
