@@ -69,6 +69,11 @@ def identifiers(value) -> list[str]:
     return [each["@id"] for each in (value if isinstance(value, list) else [value])]
 
 
+def write_record(path: Path, parameters: dict, **more: object) -> None:
+    """Write a JSON result whose record has such parameters."""
+    path.write_text(json.dumps({"provenance": provenance.record(parameters) | more}))
+
+
 def test_the_crate_holds_rules_inputs_and_results_and_nothing_hidden(results):
     files = crate(results)
     assert files[SNAKEFILE] == (CHECKOUT / SNAKEFILE).read_bytes()
@@ -181,8 +186,7 @@ def test_a_crate_among_the_results_is_not_part_of_the_next(results):
 
 
 def test_what_the_run_has_made_itself_is_no_input(results):
-    record = provenance.record({"mesh": str(results / "box.obj"), "material": "smooth"})
-    (results / "of_box.json").write_text(json.dumps({"provenance": record}))
+    write_record(results / "of_box.json", {"mesh": str(results / "box.obj")})
     shutil.copy("meshes/my bar.obj", results / "box.obj")
     assert "inputs/box.obj" not in crate(results)
 
@@ -192,18 +196,13 @@ def test_inputs_are_told_by_name_as_the_results_of_others_may_name_any_file(resu
     assert capsys.readouterr().out.splitlines()[-1] == "inputs: meshes/my bar.obj"
 
 
-def test_inputs_of_one_name_are_all_in_the_crate(results):
+@pytest.mark.parametrize("name", ["my bar", "My Bar"])
+def test_inputs_of_one_name_in_any_case_are_all_in_the_crate(results, name):
     Path("other").mkdir()
-    Path("other/my bar.obj").write_bytes(b"v 0 0 0\n")
-    record = provenance.record({"mesh": "other/my bar.obj"})
-    (results / "of_other.json").write_text(json.dumps({"provenance": record}))
+    Path(f"other/{name}.obj").write_bytes(b"v 0 0 0\n")
+    write_record(results / "of_other.json", {"mesh": f"other/{name}.obj"})
     files = crate(results)
-    assert files["inputs/my bar-2.obj"] == b"v 0 0 0\n"
-
-
-def write_record(path: Path, parameters: dict, **more: object) -> None:
-    """Write a JSON result whose record has such parameters."""
-    path.write_text(json.dumps({"provenance": provenance.record(parameters) | more}))
+    assert files[f"inputs/{name}-2.obj"] == b"v 0 0 0\n" and "inputs/my bar.obj" in files
 
 
 def test_names_that_are_no_text_are_escaped(results):

@@ -106,12 +106,13 @@ def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[CrateFile]:
         path = require_file(file, "an input of the run; make the crate in the folder of the run")
         if results in path.resolve().parents or (own.is_file() and path.samefile(own)):
             continue
-        taken = {each.name for each in found}
+        # Some systems take names that differ in case alone for one.
+        taken = {each.name.casefold() for each in found}
         names = (
             f"{path.stem}{number}{path.suffix}"
             for number in chain([""], map("-{}".format, count(2)))
         )
-        name = next(name for name in names if f"{INPUTS}/{name}" not in taken)
+        name = next(name for name in names if f"{INPUTS}/{name}".casefold() not in taken)
         require_plain(Path(name))
         found.append(CrateFile(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
     return found
