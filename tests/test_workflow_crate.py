@@ -219,6 +219,16 @@ def test_names_that_are_no_text_are_escaped(results):
     assert r"d\udcff/box.obj" in told and r"commit \ud800" in told
 
 
+def test_folders_of_absolute_paths_are_not_told_of_inputs(results, tmp_path):
+    home = tmp_path / "home of ada"
+    home.mkdir()
+    (home / "box.obj").write_bytes(b"v 0 0 0\n")
+    write_record(results / "of_box.json", {"mesh": str(home / "box.obj")}, command="carillon")
+    files = crate(results)
+    assert entities(files)["inputs/box.obj"]["alternateName"] == "box.obj"
+    assert home.name not in files[METADATA].decode()
+
+
 def test_roles_follow_the_folders(results):
     roles = {part.name: part.role for part in results_of(results)}
     assert roles["results/config.yaml"] is Role.CONFIGURATION

@@ -44,6 +44,12 @@ class CrateFile:
     """Path by which the run knew it, if that is another."""
 
     @property
+    def published_original(self) -> str:
+        """`original`, but of an absolute path the last part: folders tell of their owner."""
+        path = Path(self.original)
+        return path.name if path.is_absolute() else self.original
+
+    @property
     def is_result(self) -> bool:
         """Whether the run has made it, other than as a trace of itself."""
         return self.role is Role.RESULT

@@ -131,7 +131,7 @@ class _Graph:
             "encodingFormat": _format(source.name),
         }
         if source.original and source.original != source.name:
-            properties["alternateName"] = unicode_of(source.original)
+            properties["alternateName"] = unicode_of(source.published_original)
         if source.name != SNAKEFILE:
             return self.crate.add_file(dest_path=source.name, properties=properties)
         software = self.about.software
