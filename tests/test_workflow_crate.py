@@ -152,6 +152,18 @@ def test_a_run_of_somebody_else_names_its_creator_and_licence(results):
     assert author["name"] == "The Carillon developers"
 
 
+@pytest.mark.parametrize("name", ["run", "configfile", "results_dir", "The Carillon developers"])
+def test_creators_have_any_name(results, name):
+    known = entities(crate(results, "--creator", name))
+    (creator,) = (known[each] for each in identifiers(known["./"]["creator"]))
+    assert (creator["@type"], creator["name"]) == ("Person", name)
+    (author,) = (known[each] for each in identifiers(known[SNAKEFILE]["author"]))
+    assert author["@type"] == "Organization"
+    assert known["#run"]["@type"] == "CreateAction"
+    parameters = {each["name"] for each in known.values() if each["@type"] == "FormalParameter"}
+    assert parameters == {"configfile", "files of models", "results_dir"}
+
+
 def test_the_page_for_people_says_what_to_cite(results):
     page = crate(results, "--licence", "CC-BY-4.0")[README].decode()
     assert page.startswith("# Two bells & \\<b\\>\n")

@@ -118,7 +118,8 @@ class _Graph:
 
     def _agent(self, author: Mapping[str, str]) -> ContextEntity:
         name, kind = name_of(author), "Person" if is_person(author) else "Organization"
-        return self.entity(author.get("orcid", f"#{quote(name)}"), kind, name=name)
+        own = f"#{kind.lower()}-{quote(name)}"
+        return self.entity(author.get("orcid", own), kind, name=name)
 
     def file(self, copied: Copied) -> File:
         """Add a file."""
