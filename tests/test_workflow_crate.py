@@ -312,6 +312,7 @@ def test_what_cannot_be_a_crate_is_told_in_a_sentence_and_nothing_is_left(
         (["--creator", " "], "--creator: found ' '"),
         (["--leave-out", "../meshes"], "--leave-out ../meshes: there is no such"),
         (["--leave-out", "nothing"], "--leave-out nothing: there is no such"),
+        (["--leave-out", "logs", "./config.yaml"], "which every crate holds"),
     ],
 )
 def test_options_that_make_no_sense_are_told(results, options, sentence, capsys):

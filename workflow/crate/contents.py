@@ -150,6 +150,11 @@ def _below(results: Path, name: str) -> Path:
     path = results / name
     if ".." in Path(name).parts or results not in path.parents or not os.path.lexists(path):
         raise UserError(f"--leave-out {name}: there is no such file or folder below {results}")
+    if path == results / CONFIGURATION:
+        raise UserError(
+            f"--leave-out {name}: is the configuration of the run, which every crate holds; leave "
+            "out results only"
+        )
     return path
 
 
