@@ -262,6 +262,23 @@ def _without_mesh(results: Path) -> None:
     Path("meshes/my bar.obj").unlink()
 
 
+def _of_a_lost_mesh(results: Path) -> None:
+    write_record(results / "of_lost.json", {"mesh": "lost.obj"})
+
+
+def _of_a_folder(results: Path) -> None:
+    write_record(results / "of_folder.json", {"mesh": "meshes"})
+
+
+def _of_an_odd_name(results: Path) -> None:
+    Path("a\nb.obj").write_bytes(b"v 0 0 0\n")
+    write_record(results / "of_odd.json", {"mesh": "a\nb.obj"})
+
+
+def _of_no_name(results: Path) -> None:
+    write_record(results / "of_none.json", {"mesh": "\ud800.obj"})
+
+
 def _with_a_link(results: Path) -> None:
     (results / "secret.txt").symlink_to("/etc/hostname")
 
@@ -285,7 +302,14 @@ def _with_a_mistake(results: Path) -> None:
         (shutil.rmtree, "my results: is no folder"),
         (_without_configuration, "holds no config.yaml"),
         (_without_results, "holds no results but config.yaml"),
-        (_without_mesh, "my bar.obj: "),
+        (_without_mesh, "config.yaml names meshes/my bar.obj: no such file, expected an"),
+        (
+            _of_a_lost_mesh,
+            "my results/of_lost.json names lost.obj: no such file, expected an input",
+        ),
+        (_of_a_folder, "my results/of_folder.json names meshes: is a folder, expected an input"),
+        (_of_an_odd_name, "my results/of_odd.json names 'a\\nb.obj': holds line breaks"),
+        (_of_no_name, "my results/of_none.json names "),
         (_with_a_link, "secret.txt: is a link"),
         (_with_a_linked_folder, "elsewhere: is a link"),
         (_damaged, "0.h5: "),

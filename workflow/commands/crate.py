@@ -69,12 +69,13 @@ def run(arguments: argparse.Namespace) -> None:
     found = [file for file in found if not _is_same(file.path, arguments.out)]
     config = settings.complete([results / contents.CONFIGURATION])
     about = _description(config, arguments.creator, arguments.licence)
-    made_by = {
-        file.name: origin
+    origins = {
+        file: origin
         for file in track(found, "records", unit="files")
         if file.is_result and (origin := origin_of(file.path))
     }
-    named = {name for origin in made_by.values() for name in origin.inputs}
+    made_by = {file.name: origin for file, origin in origins.items()}
+    named = {each: str(file.path) for file, origin in origins.items() for each in origin.inputs}
     files = [*contents.rules(), *contents.inputs(config, named), *found]
     require_outputs(arguments, [file.path for file in files])
     copied = write_archive(

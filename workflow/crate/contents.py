@@ -97,19 +97,24 @@ def rules() -> list[CrateFile]:
     ]
 
 
-def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[CrateFile]:
+def inputs(config: Mapping[str, Any], named: Mapping[str, str]) -> list[CrateFile]:
     """Files that a run was made from: meshes, materials, regions, forests.
 
-    `named`: those that the results name, beside those of the configuration. The forests of the
-    package and what the run has made itself are none. Raises UserError if one is missing.
+    `named`: those that the results name, each with its result, beside those of the configuration.
+    The forests of the package and what the run has made itself are none. Raises UserError, which
+    says who names it, if one is missing.
     """
-    files = {file for model in config["models"] for file in settings.model_files(config, model)}
+    configured = [
+        file for model in config["models"] for file in settings.model_files(config, model)
+    ]
     forests = settings.forests_file(config)
-    files |= {*named} if forests is None else {*named, forests}
+    if forests is not None:
+        configured.append(forests)
+    files = {**named, **dict.fromkeys(configured, CONFIGURATION)}
     own, results = default_path(), Path(config["results_dir"]).resolve()
     found: list[CrateFile] = []
     for file in sorted(files):
-        path = require_file(file, "an input of the run; make the crate in the folder of the run")
+        path = _require_input(file, files[file])
         if results in path.resolve().parents or (own.is_file() and path.samefile(own)):
             continue
         # Some systems take names that differ in case alone for one.
@@ -119,9 +124,17 @@ def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[CrateFile]:
             for number in chain([""], map("-{}".format, count(2)))
         )
         name = next(name for name in names if f"{INPUTS}/{name}".casefold() not in taken)
-        require_plain(Path(name))
         found.append(CrateFile(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
     return found
+
+
+def _require_input(file: str, named_by: str) -> Path:
+    try:
+        path = require_file(file, "an input of the run; make the crate in the folder of the run")
+        require_plain(Path(path.name))
+    except UserError as error:
+        raise UserError(f"{named_by} names {error}") from None
+    return path
 
 
 def _results(results: Path, left_out: Iterable[str]) -> Iterator[CrateFile]:
