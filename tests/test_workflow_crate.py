@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import resource
 import shutil
 import zipfile
 from pathlib import Path
@@ -18,6 +19,7 @@ from carillon.records import provenance
 from tests.programs import CHECKOUT
 from workflow import settings
 from workflow.__main__ import main
+from workflow.crate.archive import write_archive
 from workflow.crate.contents import SNAKEFILE, Role, results_of
 from workflow.crate.graph import METADATA, README
 
@@ -359,4 +361,16 @@ def test_a_file_that_vanishes_while_it_is_copied_leaves_no_crate(results, monkey
     parts = results_of(results)
     with pytest.raises(UserError, match=r"empty\.csv: cannot be copied"):
         archive.write_archive(Path("run.zip"), parts, lambda files: {})
+    assert not list(Path().glob("*zip*"))
+
+
+def test_a_full_disk_is_told_of_the_archive(results):
+    parts = results_of(results)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        with pytest.raises(UserError, match=r"^run\.zip: could not be written \(.*make room"):
+            write_archive(Path("run.zip"), parts, lambda files: {})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(Path().glob("*zip*"))
