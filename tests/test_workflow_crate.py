@@ -333,6 +333,7 @@ def test_what_cannot_be_a_crate_is_told_in_a_sentence_and_nothing_is_left(
     ("options", "sentence"),
     [
         (["--out", "run.tar"], "run.tar: a crate is a ZIP file"),
+        (["--out", "run.zip/"], "run.zip/: names a folder"),
         (["--out", "nowhere/run.zip"], "nowhere does not exist"),
         (["--licence", "my own"], "--licence: found 'my own'"),
         (["--creator", " "], "--creator: found ' '"),
