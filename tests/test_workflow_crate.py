@@ -199,6 +199,11 @@ def test_a_crate_among_the_results_is_not_part_of_the_next(results):
             assert "results/run.zip" not in archive.namelist()
 
 
+def test_earlier_crates_are_no_results(results):
+    shutil.copy("meshes/my bar.obj", results / "my results.crate.zip")
+    assert not any(name.endswith(".crate.zip") for name in crate(results))
+
+
 def test_what_the_run_has_made_itself_is_no_input(results):
     write_record(results / "of_box.json", {"mesh": str(results / "box.obj")})
     shutil.copy("meshes/my bar.obj", results / "box.obj")

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError(f"{arguments.out}: a crate is a ZIP file, whose name ends with .zip")
     graph.require_rocrate()
     found = contents.results_of(results, arguments.leave_out)
-    arguments.out = arguments.out or f"{results.resolve().name}.crate.zip"
+    arguments.out = arguments.out or f"{results.resolve().name}{contents.ENDING}"
     found = [file for file in found if not _is_same(file.path, Path(arguments.out))]
     config = settings.complete([results / contents.CONFIGURATION])
     about = _description(config, arguments.creator, arguments.licence)

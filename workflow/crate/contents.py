@@ -19,6 +19,8 @@ CONFIGURATION = "config.yaml"
 """The resolved configuration in a folder of results."""
 TRACES = ("logs", "benchmarks")
 """Folders of results that tell how the jobs went, not what they found."""
+ENDING = ".crate.zip"
+"""End of the names that crates have by default."""
 SNAKEFILE = f"{RULES}/Snakefile"
 
 
@@ -58,8 +60,9 @@ class CrateFile:
 def results_of(results: Path, left_out: Iterable[str] = ()) -> list[CrateFile]:
     """Files below the folder of a run's results, its configuration among them.
 
-    `left_out`: files and folders below `results` that stay out of the crate. Hidden files do, too.
-    Raises UserError if the folder is not that of a run, or a name or link cannot be in a crate.
+    `left_out`: files and folders below `results` that stay out of the crate. Hidden files and
+    earlier crates do, too. Raises UserError if the folder is not that of a run, or a name or link
+    cannot be in a crate.
     """
     _require_run(results)
     files = list(_results(results, left_out))
@@ -172,7 +175,7 @@ def _below(results: Path, name: str) -> Path:
 
 
 def _belongs(path: Path, absent: set[Path]) -> bool:
-    if path.name.startswith(".") or path in absent:
+    if path.name.startswith(".") or path.name.endswith(ENDING) or path in absent:
         return False
     if path.is_symlink():
         raise UserError(
