@@ -3,6 +3,7 @@
 The main paths do without what macOS and Windows lack of Linux, too.
 """
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -147,6 +148,23 @@ def test_commands_of_an_extra_say_what_to_install(
     sentence = refuses(main, *command.split())
     assert f"this needs {package}, which is not installed" in sentence
     assert extras.install(extra) in sentence
+
+
+def test_convergence_is_followed_to_the_eigenvalues_of_arpack(core, tmp_path, run_cli):
+    words = ("convergence", *SOLID, "--steps", "1", "--out")
+    done = core("-m", "carillon", "study", *words, tmp_path / "arpack.json")
+    assert done.returncode == 0, done.stderr
+    run_cli("carillon", "study", *words, tmp_path / "slepc.json", check=True)
+    exact, expected = (
+        json.loads((tmp_path / f"{name}.json").read_text())["exact"] for name in ("arpack", "slepc")
+    )
+    assert exact == pytest.approx(expected, rel=1e-9)
+
+
+def test_ratios_are_rated_by_arpack(core):
+    words = ("ratios", "builtin:bar", "--resolution", "8", "--ratios", "0.3")
+    done = core("-m", "carillon", "study", *words)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"])
