@@ -1,9 +1,9 @@
 """Writes what archives read about the project: `python .ci/archive_metadata.py`.
 
-codemeta.json and .zenodo.json are made from CITATION.cff, pyproject.toml and requirements.txt; a
-test fails while they differ. Sources: CodeMeta 3.0 (https://w3id.org/codemeta/3.0), and the deposit
-metadata of Zenodo (https://developers.zenodo.org/#representation), which takes the version from the
-tag of a release.
+codemeta.json and .zenodo.json are made from CITATION.cff, pyproject.toml and the files of
+requirements that it names; a test fails while they differ. Sources: CodeMeta 3.0
+(https://w3id.org/codemeta/3.0), and the deposit metadata of Zenodo
+(https://developers.zenodo.org/#representation), which takes the version from the tag of a release.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ CODEMETA, ZENODO = "codemeta.json", ".zenodo.json"
 def texts(root: Path = ROOT) -> dict[str, str]:
     """Content of both files, by name."""
     citation = yaml.safe_load((root / "CITATION.cff").read_text())
-    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
-    needs = _requirements((root / "workflow" / "envs" / "requirements.txt").read_text())
-    documents = {CODEMETA: codemeta(citation, project, needs), ZENODO: zenodo(citation)}
+    package = tomllib.loads((root / "pyproject.toml").read_text())
+    files = package["tool"]["setuptools"]["dynamic"]["dependencies"]["file"]
+    needs = [need for name in files for need in _requirements((root / name).read_text())]
+    documents = {CODEMETA: codemeta(citation, package["project"], needs), ZENODO: zenodo(citation)}
     return {
         name: json.dumps(document, indent=2, ensure_ascii=False) + "\n"
         for name, document in documents.items()

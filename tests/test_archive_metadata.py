@@ -33,6 +33,8 @@ def test_codemeta_names_version_licence_and_requirements(citation):
     assert found["license"].endswith(f"/{citation['license']}")
     named = {each["name"] for each in found["softwareRequirements"]}
     assert {"numpy", "scipy", "pydantic"} <= named
+    assert {"soundfile", "starlette", "mujoco-core"} <= named, "of sounds, the studio and scenes"
+    assert "mpi4py" not in named, "of an extra"
 
 
 def test_zenodo_gets_what_a_deposit_of_software_must_have(citation):

@@ -3,6 +3,7 @@
 The main paths do without what macOS and Windows lack of Linux, too.
 """
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -16,6 +17,7 @@ from carillon.command_line import commands
 from carillon.processes import extras, one_rank
 from solver.files.modes_file import read_modes
 from solver.verification.audit import audit_files
+from studies.scaling import launch
 from tests.core_paths import CLUSTER, SOLID
 from tests.programs import CHECKOUT, checkout_environment, python
 from tests.rank_counts import TO_THREE
@@ -147,6 +149,39 @@ def test_commands_of_an_extra_say_what_to_install(
     sentence = refuses(main, *command.split())
     assert f"this needs {package}, which is not installed" in sentence
     assert extras.install(extra) in sentence
+
+
+@pytest.mark.parametrize(
+    ("study", "packages"),
+    [
+        ("scaling", "mpi4py, which is"),
+        ("coarsening", "mpi4py and petsc4py and slepc4py, which are"),
+        ("objectives", "mpi4py and petsc4py and slepc4py, which are"),
+    ],
+)
+def test_studies_that_need_them_say_so_before_they_start(study, packages, refuses, monkeypatch):
+    monkeypatch.setattr(extras, "_is_found", lambda package: False)
+    monkeypatch.setattr(launch, "run_child", None)
+    sentence = refuses(main, "study", study, "builtin:bar", "--resolution", "8")
+    assert f"the study of {study} needs {packages} not installed" in sentence
+    assert sentence.endswith(extras.install())
+
+
+def test_convergence_is_followed_to_the_eigenvalues_of_arpack(core, tmp_path, run_cli):
+    words = ("convergence", *SOLID, "--steps", "1", "--out")
+    done = core("-m", "carillon", "study", *words, tmp_path / "arpack.json")
+    assert done.returncode == 0, done.stderr
+    run_cli("carillon", "study", *words, tmp_path / "slepc.json", check=True)
+    exact, expected = (
+        json.loads((tmp_path / f"{name}.json").read_text())["exact"] for name in ("arpack", "slepc")
+    )
+    assert exact == pytest.approx(expected, rel=1e-9)
+
+
+def test_ratios_are_rated_by_arpack(core):
+    words = ("ratios", "builtin:bar", "--resolution", "8", "--ratios", "0.3")
+    done = core("-m", "carillon", "study", *words)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"])

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import resource
 import shutil
 import zipfile
 from pathlib import Path
@@ -18,6 +19,7 @@ from carillon.records import provenance
 from tests.programs import CHECKOUT
 from workflow import settings
 from workflow.__main__ import main
+from workflow.crate.archive import write_archive
 from workflow.crate.contents import SNAKEFILE, Role, results_of
 from workflow.crate.graph import METADATA, README
 
@@ -67,6 +69,11 @@ def entities(files: dict[str, bytes]) -> dict[str, dict]:
 def identifiers(value) -> list[str]:
     """Identifiers of one or several references."""
     return [each["@id"] for each in (value if isinstance(value, list) else [value])]
+
+
+def write_record(path: Path, parameters: dict, **more: object) -> None:
+    """Write a JSON result whose record has such parameters."""
+    path.write_text(json.dumps({"provenance": provenance.record(parameters) | more}))
 
 
 def test_the_crate_holds_rules_inputs_and_results_and_nothing_hidden(results):
@@ -147,6 +154,18 @@ def test_a_run_of_somebody_else_names_its_creator_and_licence(results):
     assert author["name"] == "The Carillon developers"
 
 
+@pytest.mark.parametrize("name", ["run", "configfile", "results_dir", "The Carillon developers"])
+def test_creators_have_any_name(results, name):
+    known = entities(crate(results, "--creator", name))
+    (creator,) = (known[each] for each in identifiers(known["./"]["creator"]))
+    assert (creator["@type"], creator["name"]) == ("Person", name)
+    (author,) = (known[each] for each in identifiers(known[SNAKEFILE]["author"]))
+    assert author["@type"] == "Organization"
+    assert known["#run"]["@type"] == "CreateAction"
+    parameters = {each["name"] for each in known.values() if each["@type"] == "FormalParameter"}
+    assert parameters == {"configfile", "files of models", "results_dir"}
+
+
 def test_the_page_for_people_says_what_to_cite(results):
     page = crate(results, "--licence", "CC-BY-4.0")[README].decode()
     assert page.startswith("# Two bells & \\<b\\>\n")
@@ -180,9 +199,13 @@ def test_a_crate_among_the_results_is_not_part_of_the_next(results):
             assert "results/run.zip" not in archive.namelist()
 
 
+def test_earlier_crates_are_no_results(results):
+    shutil.copy("meshes/my bar.obj", results / "my results.crate.zip")
+    assert not any(name.endswith(".crate.zip") for name in crate(results))
+
+
 def test_what_the_run_has_made_itself_is_no_input(results):
-    record = provenance.record({"mesh": str(results / "box.obj"), "material": "smooth"})
-    (results / "of_box.json").write_text(json.dumps({"provenance": record}))
+    write_record(results / "of_box.json", {"mesh": str(results / "box.obj")})
     shutil.copy("meshes/my bar.obj", results / "box.obj")
     assert "inputs/box.obj" not in crate(results)
 
@@ -192,13 +215,37 @@ def test_inputs_are_told_by_name_as_the_results_of_others_may_name_any_file(resu
     assert capsys.readouterr().out.splitlines()[-1] == "inputs: meshes/my bar.obj"
 
 
-def test_inputs_of_one_name_are_all_in_the_crate(results):
+@pytest.mark.parametrize("name", ["my bar", "My Bar"])
+def test_inputs_of_one_name_in_any_case_are_all_in_the_crate(results, name):
     Path("other").mkdir()
-    Path("other/my bar.obj").write_bytes(b"v 0 0 0\n")
-    record = provenance.record({"mesh": "other/my bar.obj"})
-    (results / "of_other.json").write_text(json.dumps({"provenance": record}))
+    Path(f"other/{name}.obj").write_bytes(b"v 0 0 0\n")
+    write_record(results / "of_other.json", {"mesh": f"other/{name}.obj"})
     files = crate(results)
-    assert files["inputs/my bar-2.obj"] == b"v 0 0 0\n"
+    assert files[f"inputs/{name}-2.obj"] == b"v 0 0 0\n" and "inputs/my bar.obj" in files
+
+
+def test_names_that_are_no_text_are_escaped(results):
+    folder = Path(os.fsdecode(b"d\xff"))
+    folder.mkdir()
+    (folder / "box.obj").write_bytes(b"v 0 0 0\n")
+    command = f"carillon modes {folder}/box.obj"
+    write_record(
+        results / "of_box.json", {"mesh": f"{folder}/box.obj"}, command=command, commit="\ud800"
+    )
+    known = entities(crate(results))
+    assert known["inputs/box.obj"]["alternateName"] == r"d\udcff/box.obj"
+    told = known["#made-results/of_box.json"]["description"]
+    assert r"d\udcff/box.obj" in told and r"commit \ud800" in told
+
+
+def test_folders_of_absolute_paths_are_not_told_of_inputs(results, tmp_path):
+    home = tmp_path / "home of ada"
+    home.mkdir()
+    (home / "box.obj").write_bytes(b"v 0 0 0\n")
+    write_record(results / "of_box.json", {"mesh": str(home / "box.obj")}, command="carillon")
+    files = crate(results)
+    assert entities(files)["inputs/box.obj"]["alternateName"] == "box.obj"
+    assert home.name not in files[METADATA].decode()
 
 
 def test_roles_follow_the_folders(results):
@@ -220,6 +267,23 @@ def _without_results(results: Path) -> None:
 
 def _without_mesh(results: Path) -> None:
     Path("meshes/my bar.obj").unlink()
+
+
+def _of_a_lost_mesh(results: Path) -> None:
+    write_record(results / "of_lost.json", {"mesh": "lost.obj"})
+
+
+def _of_a_folder(results: Path) -> None:
+    write_record(results / "of_folder.json", {"mesh": "meshes"})
+
+
+def _of_an_odd_name(results: Path) -> None:
+    Path("a\nb.obj").write_bytes(b"v 0 0 0\n")
+    write_record(results / "of_odd.json", {"mesh": "a\nb.obj"})
+
+
+def _of_no_name(results: Path) -> None:
+    write_record(results / "of_none.json", {"mesh": "\ud800.obj"})
 
 
 def _with_a_link(results: Path) -> None:
@@ -245,7 +309,14 @@ def _with_a_mistake(results: Path) -> None:
         (shutil.rmtree, "my results: is no folder"),
         (_without_configuration, "holds no config.yaml"),
         (_without_results, "holds no results but config.yaml"),
-        (_without_mesh, "my bar.obj: "),
+        (_without_mesh, "config.yaml names meshes/my bar.obj: no such file, expected an"),
+        (
+            _of_a_lost_mesh,
+            "my results/of_lost.json names lost.obj: no such file, expected an input",
+        ),
+        (_of_a_folder, "my results/of_folder.json names meshes: is a folder, expected an input"),
+        (_of_an_odd_name, "my results/of_odd.json names 'a\\nb.obj': holds line breaks"),
+        (_of_no_name, "my results/of_none.json names "),
         (_with_a_link, "secret.txt: is a link"),
         (_with_a_linked_folder, "elsewhere: is a link"),
         (_damaged, "0.h5: "),
@@ -267,11 +338,13 @@ def test_what_cannot_be_a_crate_is_told_in_a_sentence_and_nothing_is_left(
     ("options", "sentence"),
     [
         (["--out", "run.tar"], "run.tar: a crate is a ZIP file"),
+        (["--out", "run.zip/"], "run.zip/: names a folder"),
         (["--out", "nowhere/run.zip"], "nowhere does not exist"),
         (["--licence", "my own"], "--licence: found 'my own'"),
         (["--creator", " "], "--creator: found ' '"),
         (["--leave-out", "../meshes"], "--leave-out ../meshes: there is no such"),
         (["--leave-out", "nothing"], "--leave-out nothing: there is no such"),
+        (["--leave-out", "logs", "./config.yaml"], "which every crate holds"),
     ],
 )
 def test_options_that_make_no_sense_are_told(results, options, sentence, capsys):
@@ -294,4 +367,16 @@ def test_a_file_that_vanishes_while_it_is_copied_leaves_no_crate(results, monkey
     parts = results_of(results)
     with pytest.raises(UserError, match=r"empty\.csv: cannot be copied"):
         archive.write_archive(Path("run.zip"), parts, lambda files: {})
+    assert not list(Path().glob("*zip*"))
+
+
+def test_a_full_disk_is_told_of_the_archive(results):
+    parts = results_of(results)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        with pytest.raises(UserError, match=r"^run\.zip: could not be written \(.*make room"):
+            write_archive(Path("run.zip"), parts, lambda files: {})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(Path().glob("*zip*"))

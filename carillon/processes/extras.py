@@ -39,16 +39,17 @@ def is_installed(package: str) -> bool:
 
 
 @on_all_ranks()
-def require(package: str, what: str, instead: str) -> None:
+def require(package: str, what: str, instead: str | None = None) -> None:
     """Raise UserError unless one of the cluster's packages is installed.
 
-    The sentence says `what` needs it, and what can be done `instead` of installing it.
+    The sentence says `what` needs it, and what can be done `instead` of installing it, if anything.
     """
     missing = _missing(package)
     if missing:
+        remedy = install() if instead is None else f"{instead}, or {install()}"
         raise UserError(
             f"{what} needs {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} "
-            f"not installed; {instead}, or {install()}"
+            f"not installed; {remedy}"
         )
 
 

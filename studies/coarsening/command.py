@@ -9,6 +9,7 @@ from carillon.errors import UserError
 from carillon.fem.model import RIGID_MODES
 from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import NumberOfModes, Positive, between
+from carillon.processes import extras
 from carillon.records.measurement import measured
 from solver.analysis.problem import ProblemOptions
 from solver.coarsening.choice import METHODS
@@ -68,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve, compare, write, and print the errors."""
     with on_ranks():
+        extras.require(extras.SLEPC, "the study of coarsening")
         require_outputs(arguments)
         names = [arguments.out, arguments.pictures]
         if None not in names and len({Path(name).resolve() for name in names}) == 1:

@@ -17,6 +17,7 @@ from solver.analysis.problem import ProblemOptions, build_problem
 from solver.coarsening.choice import FIT
 from solver.coarsening.forest import FOREST
 from solver.files.modes_file import frequencies
+from solver.reference.eigensolver import installed_method
 from solver.verification.matching import AUDIBLE_LAST, frequency_errors
 from studies.coarsening.costs import take
 
@@ -86,7 +87,7 @@ def _coarsened(options: ProblemOptions, name: str) -> ProblemOptions:
 
 
 def _options(model: ElasticModel) -> SolverOptions:
-    return SolverOptions(method="slepc", modes=min(AUDIBLE_LAST, model.n_dofs))
+    return SolverOptions(method=installed_method(), modes=min(AUDIBLE_LAST, model.n_dofs))
 
 
 def _hertz(model: ElasticModel) -> Array:

@@ -25,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--steps", type=reader(Corrections), default=3, help="corrections (default 3)"
     )
     parser.add_argument(
-        "--truth", help="modes file with the exact eigenvalues (default: SLEPc finds them)"
+        "--truth",
+        help="modes file with the exact eigenvalues (default: SLEPc or else ARPACK finds them)",
     )
     parser.add_argument("--out", required=True, help="JSON file to write")
 

@@ -22,6 +22,7 @@ from solver.files.modes_file import read_modes
 from solver.hcms.condense import INTERFACES
 from solver.hcms.synthesis import synthesize
 from solver.linear import LinearSolver
+from solver.reference.eigensolver import installed_method
 from solver.verification.matching import eigenvalue_errors
 
 RANDOM = "random"
@@ -57,7 +58,8 @@ def correction_history(
     steps
         Corrections made.
     truth
-        Modes file of the same solid with its exact eigenvalues; SLEPc finds them if not given.
+        Modes file of the same solid with its exact eigenvalues; if not given, SLEPc finds them, or
+        ARPACK where SLEPc is not installed.
     """
     bcast_from_root(comm, lambda: check_mode_count(modes, cast(Solid, model).n_dofs))
     rigid = bcast_from_root(comm, lambda: cast(Solid, model).rigid_modes)
@@ -94,10 +96,10 @@ def correction_history(
 
 
 def _exact(model: Solid | None, modes: int, truth: str | Path | None, comm: MPI.Comm) -> Array:
-    """The lowest eigenvalues (modes,) from the file `truth` or by SLEPc."""
+    """The lowest eigenvalues (modes,) from the file `truth`, or by SLEPc or else ARPACK."""
     if truth is not None:
         return bcast_from_root(comm, lambda: _read_exact(cast(Solid, model), modes, truth))
-    result = modal_analysis(model, SolverOptions(method="slepc", modes=modes), comm)
+    result = modal_analysis(model, SolverOptions(method=installed_method(), modes=modes), comm)
     result.system.destroy()
     return result.values
 

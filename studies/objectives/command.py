@@ -7,6 +7,7 @@ from typing import Any
 from carillon.errors import UserError
 from carillon.parameters.command_line import collect, reader
 from carillon.parameters.quantities import NumberOfModes
+from carillon.processes import extras
 from carillon.records.provenance import record
 from dataset_gen.objectives import OBJECTIVES, require_objective
 from solver.analysis.problem import ProblemOptions
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve with every coarsening and print the errors."""
     with on_ranks() as comm:
+        extras.require(extras.SLEPC, "the study of objectives")
         require_outputs(arguments, comm)
         described = collect(ProblemOptions, arguments)
         ratings = rate_objectives(described, arguments.modes, arguments.objectives, comm)

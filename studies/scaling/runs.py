@@ -9,6 +9,7 @@ from carillon.fem.model import Solid
 from carillon.parameters import OneOf, option, parameters
 from carillon.parameters.command_line import reader
 from carillon.parameters.quantities import NumberOfModes, Tolerance, between
+from carillon.processes import extras
 from solver import linear
 from solver.analysis.problem import ProblemOptions, build_problem
 from solver.correction.criteria import INTERACTIVE_TOLERANCE
@@ -73,7 +74,7 @@ def scaling_study(
 ) -> Result:
     """Run on every number of ranks, fit the model, and predict.
 
-    Raises UserError for anything wrong with the solid, or if all runs fail.
+    Raises UserError for anything wrong with the solid, without mpi4py, or if all runs fail.
 
     Parameters
     ----------
@@ -88,6 +89,7 @@ def scaling_study(
         Plain values: `strong` and `weak` (None unless asked for), each with `runs`, what was said
         by those that `failed`, and `model`.
     """
+    extras.require(extras.MPI, "the study of scaling")
     require_ranks(max(scaling.ranks))
     problem = build_problem(options)
 

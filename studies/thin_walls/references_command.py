@@ -7,6 +7,7 @@ other solids stay as they are.
 import argparse
 from pathlib import Path
 
+from carillon.command_line.outputs import require_outputs
 from carillon.command_line.progress import say, track
 from studies.thin_walls.catalogue import REFERENCES
 from studies.thin_walls.names import add_solids, chosen_solids
@@ -22,8 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_solids(parser)
     parser.add_argument(
         "--out",
-        type=Path,
-        default=REFERENCES,
+        default=str(REFERENCES),
         metavar="FILE",
         help="file of references (YAML) that they are written to (default: that of the study)",
     )
@@ -31,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Compute and write, solid by solid."""
+    require_outputs(arguments)
+    out = Path(arguments.out)
     for name, solid in track(list(chosen_solids(arguments).items()), "solids"):
         found = compute_reference(name, solid)
-        write_references(read_references(arguments.out) | {name: found}, arguments.out)
+        write_references(read_references(out) | {name: found}, out)
         say(f"{name}: {found.method}, {found.how}, to {found.doubt:.1e}")

@@ -12,7 +12,7 @@ from studies.accuracy import domains
 from studies.accuracy.ritz import free_eigenvalues
 from studies.accuracy.solids import DENSITY, POISSON, YOUNG
 from studies.accuracy.tetrahedra import missing
-from studies.thin_walls import profiles
+from studies.thin_walls import profiles, references_command
 from studies.thin_walls.catalogue import NAMES
 from studies.thin_walls.harmonics import harmonic_frequencies
 from studies.thin_walls.profiles import Profile, profile_of
@@ -167,6 +167,13 @@ def test_what_no_method_suits_gets_a_sentence():
     solid = WalledSolid("Bar", "thick", lambda: builtin_surface("bar"), 0.0)
     with pytest.raises(UserError, match="no method finds references of 'other'; known are"):
         compute_reference("other", solid)
+
+
+def test_references_are_not_computed_for_a_folder(refuses, monkeypatch, tmp_path):
+    monkeypatch.setattr(references_command, "compute_reference", None)
+    out = f"{tmp_path}/references.yaml/"
+    said = refuses(main, "study", "thin-wall-references", "--solids", "ring", "--out", out)
+    assert f"{out}: names a folder" in said
 
 
 def test_unknown_solids_get_one_sentence(refuses):

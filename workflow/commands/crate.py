@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "results", nargs="?", type=Path, default=Path("results"), help="(default results)"
     )
     parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="ZIP file to write (default RESULTS.crate.zip)"
+        "--out", metavar="FILE", help="ZIP file to write (default RESULTS.crate.zip)"
     )
     parser.add_argument(
         "--creator", metavar="NAME", help="whose run it is (default: the authors of Carillon)"
@@ -61,26 +61,26 @@ def run(arguments: argparse.Namespace) -> None:
     Raises UserError for a folder that is not that of a run, or if it cannot be written.
     """
     results = Path(arguments.results)
-    if arguments.out is not None and arguments.out.suffix != ".zip":
+    if arguments.out is not None and Path(arguments.out).suffix != ".zip":
         raise UserError(f"{arguments.out}: a crate is a ZIP file, whose name ends with .zip")
     graph.require_rocrate()
     found = contents.results_of(results, arguments.leave_out)
-    arguments.out = arguments.out or Path(f"{results.resolve().name}.crate.zip")
-    found = [file for file in found if not _is_same(file.path, arguments.out)]
+    arguments.out = arguments.out or f"{results.resolve().name}{contents.ENDING}"
+    found = [file for file in found if not _is_same(file.path, Path(arguments.out))]
     config = settings.complete([results / contents.CONFIGURATION])
     about = _description(config, arguments.creator, arguments.licence)
-    made_by = {
-        file.name: origin
+    origins = {
+        file: origin
         for file in track(found, "records", unit="files")
         if file.is_result and (origin := origin_of(file.path))
     }
-    named = {name for origin in made_by.values() for name in origin.inputs}
+    made_by = {file.name: origin for file, origin in origins.items()}
+    named = {each: str(file.path) for file, origin in origins.items() for each in origin.inputs}
     files = [*contents.rules(), *contents.inputs(config, named), *found]
     require_outputs(arguments, [file.path for file in files])
-    copied = write_archive(
-        arguments.out, files, lambda copies: graph.texts_of(copies, made_by, about)
-    )
-    _tell(arguments.out, copied, len(made_by), arguments.json)
+    out = Path(arguments.out)
+    copied = write_archive(out, files, lambda copies: graph.texts_of(copies, made_by, about))
+    _tell(out, copied, len(made_by), arguments.json)
 
 
 def _description(

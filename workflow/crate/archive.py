@@ -4,6 +4,7 @@ import hashlib
 import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,22 +56,38 @@ def write_archive(
     return copied
 
 
-def _size(file: CrateFile) -> int:
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Tell errors of a file that is read from those of the archive, which is written meanwhile."""
     try:
-        return file.path.stat().st_size
+        yield
     except OSError as error:
-        raise UserError(f"{file.path}: cannot be copied ({cause(error)})") from error
+        raise UserError(f"{path}: cannot be copied ({cause(error)})") from error
+
+
+def _size(file: CrateFile) -> int:
+    with _reading(file.path):
+        return file.path.stat().st_size
 
 
 def _copies(archive: zipfile.ZipFile, files: Sequence[CrateFile]) -> Iterator[Copied]:
     for file in files:
-        try:
-            with open(file.path, "rb") as stream:
-                modified = file.path.stat().st_mtime
-                pieces = iter(lambda: stream.read(_PIECE), b"")
-                yield Copied(file, *_add(archive, _entry(file.name, modified), pieces), modified)
-        except OSError as error:
-            raise UserError(f"{file.path}: cannot be copied ({cause(error)})") from error
+        with _reading(file.path):
+            modified = file.path.stat().st_mtime
+        size, sha256 = _add(archive, _entry(file.name, modified), _pieces(file.path))
+        yield Copied(file, size, sha256, modified)
+
+
+def _pieces(path: Path) -> Iterator[bytes]:
+    with _reading(path):
+        stream = open(path, "rb")
+    with stream:
+        while True:
+            with _reading(path):
+                piece = stream.read(_PIECE)
+            if not piece:
+                return
+            yield piece
 
 
 def _entry(name: str, modified: float) -> zipfile.ZipInfo:

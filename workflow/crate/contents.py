@@ -19,6 +19,8 @@ CONFIGURATION = "config.yaml"
 """The resolved configuration in a folder of results."""
 TRACES = ("logs", "benchmarks")
 """Folders of results that tell how the jobs went, not what they found."""
+ENDING = ".crate.zip"
+"""End of the names that crates have by default."""
 SNAKEFILE = f"{RULES}/Snakefile"
 
 
@@ -44,6 +46,12 @@ class CrateFile:
     """Path by which the run knew it, if that is another."""
 
     @property
+    def published_original(self) -> str:
+        """`original`, but of an absolute path the last part: folders tell of their owner."""
+        path = Path(self.original)
+        return path.name if path.is_absolute() else self.original
+
+    @property
     def is_result(self) -> bool:
         """Whether the run has made it, other than as a trace of itself."""
         return self.role is Role.RESULT
@@ -52,8 +60,9 @@ class CrateFile:
 def results_of(results: Path, left_out: Iterable[str] = ()) -> list[CrateFile]:
     """Files below the folder of a run's results, its configuration among them.
 
-    `left_out`: files and folders below `results` that stay out of the crate. Hidden files do, too.
-    Raises UserError if the folder is not that of a run, or a name or link cannot be in a crate.
+    `left_out`: files and folders below `results` that stay out of the crate. Hidden files and
+    earlier crates do, too. Raises UserError if the folder is not that of a run, or a name or link
+    cannot be in a crate.
     """
     _require_run(results)
     files = list(_results(results, left_out))
@@ -91,30 +100,44 @@ def rules() -> list[CrateFile]:
     ]
 
 
-def inputs(config: Mapping[str, Any], named: Iterable[str]) -> list[CrateFile]:
+def inputs(config: Mapping[str, Any], named: Mapping[str, str]) -> list[CrateFile]:
     """Files that a run was made from: meshes, materials, regions, forests.
 
-    `named`: those that the results name, beside those of the configuration. The forests of the
-    package and what the run has made itself are none. Raises UserError if one is missing.
+    `named`: those that the results name, each with its result, beside those of the configuration.
+    The forests of the package and what the run has made itself are none. Raises UserError, which
+    says who names it, if one is missing.
     """
-    files = {file for model in config["models"] for file in settings.model_files(config, model)}
+    configured = [
+        file for model in config["models"] for file in settings.model_files(config, model)
+    ]
     forests = settings.forests_file(config)
-    files |= {*named} if forests is None else {*named, forests}
+    if forests is not None:
+        configured.append(forests)
+    files = {**named, **dict.fromkeys(configured, CONFIGURATION)}
     own, results = default_path(), Path(config["results_dir"]).resolve()
     found: list[CrateFile] = []
     for file in sorted(files):
-        path = require_file(file, "an input of the run; make the crate in the folder of the run")
+        path = _require_input(file, files[file])
         if results in path.resolve().parents or (own.is_file() and path.samefile(own)):
             continue
-        taken = {each.name for each in found}
+        # Some systems take names that differ in case alone for one.
+        taken = {each.name.casefold() for each in found}
         names = (
             f"{path.stem}{number}{path.suffix}"
             for number in chain([""], map("-{}".format, count(2)))
         )
-        name = next(name for name in names if f"{INPUTS}/{name}" not in taken)
-        require_plain(Path(name))
+        name = next(name for name in names if f"{INPUTS}/{name}".casefold() not in taken)
         found.append(CrateFile(f"{INPUTS}/{name}", path, Role.INPUT, original=file))
     return found
+
+
+def _require_input(file: str, named_by: str) -> Path:
+    try:
+        path = require_file(file, "an input of the run; make the crate in the folder of the run")
+        require_plain(Path(path.name))
+    except UserError as error:
+        raise UserError(f"{named_by} names {error}") from None
+    return path
 
 
 def _results(results: Path, left_out: Iterable[str]) -> Iterator[CrateFile]:
@@ -143,11 +166,16 @@ def _below(results: Path, name: str) -> Path:
     path = results / name
     if ".." in Path(name).parts or results not in path.parents or not os.path.lexists(path):
         raise UserError(f"--leave-out {name}: there is no such file or folder below {results}")
+    if path == results / CONFIGURATION:
+        raise UserError(
+            f"--leave-out {name}: is the configuration of the run, which every crate holds; leave "
+            "out results only"
+        )
     return path
 
 
 def _belongs(path: Path, absent: set[Path]) -> bool:
-    if path.name.startswith(".") or path in absent:
+    if path.name.startswith(".") or path.name.endswith(ENDING) or path in absent:
         return False
     if path.is_symlink():
         raise UserError(

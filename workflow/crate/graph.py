@@ -20,7 +20,7 @@ from carillon.errors import UserError
 from workflow.crate.archive import Copied
 from workflow.crate.citation import is_person, name_of
 from workflow.crate.contents import SNAKEFILE, Role
-from workflow.crate.origins import Origin
+from workflow.crate.origins import Origin, unicode_of
 from workflow.crate.readme import readme_of
 
 if TYPE_CHECKING:
@@ -118,7 +118,8 @@ class _Graph:
 
     def _agent(self, author: Mapping[str, str]) -> ContextEntity:
         name, kind = name_of(author), "Person" if is_person(author) else "Organization"
-        return self.entity(author.get("orcid", f"#{quote(name)}"), kind, name=name)
+        own = f"#{kind.lower()}-{quote(name)}"
+        return self.entity(author.get("orcid", own), kind, name=name)
 
     def file(self, copied: Copied) -> File:
         """Add a file."""
@@ -131,7 +132,7 @@ class _Graph:
             "encodingFormat": _format(source.name),
         }
         if source.original and source.original != source.name:
-            properties["alternateName"] = source.original
+            properties["alternateName"] = unicode_of(source.published_original)
         if source.name != SNAKEFILE:
             return self.crate.add_file(dest_path=source.name, properties=properties)
         software = self.about.software

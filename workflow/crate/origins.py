@@ -70,15 +70,26 @@ def _origin(record: Any) -> Origin | None:
         parameters = json.loads(record["parameters"])
         named = [parameters.get(key) for key in INPUTS]
         return Origin(
-            command=str(record["command"]),
-            commit=str(record["commit"]),
-            versions=tuple((str(name), str(each)) for name, each in versions.items()),
-            machine=f"{record['processor']}, {record['blas']}",
-            date=str(record["date"]) if "date" in record else None,
+            command=unicode_of(record["command"]),
+            commit=unicode_of(record["commit"]),
+            versions=tuple((unicode_of(name), unicode_of(each)) for name, each in versions.items()),
+            machine=unicode_of(f"{record['processor']}, {record['blas']}"),
+            date=unicode_of(record["date"]) if "date" in record else None,
             inputs=tuple(each for each in named if isinstance(each, str) and _is_file(each)),
         )
     except (LookupError, TypeError, ValueError, AttributeError):
         return None
+
+
+def unicode_of(value: object) -> str:
+    r"""A value as text that UTF-8 can hold: what is none, as in names of files, is escaped.
+
+    Examples
+    --------
+    >>> print(unicode_of("d\udcff/bell.obj"))
+    d\udcff/bell.obj
+    """
+    return str(value).encode(errors="backslashreplace").decode()
 
 
 def _is_file(name: str) -> bool:
