@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from solver.__main__ import main
 from solver.files.modes_file import read_modes
@@ -91,6 +92,15 @@ def test_nothing_is_wrong_with_a_right_spectrum(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     assert main(["audit", "--strict", "bar.h5"]) == 0
     assert "nothing is wrong" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("count", [7, 8, 9])
+def test_nothing_is_wrong_where_the_last_modes_are_some_of_several_equal_ones(count, tmp_path):
+    trimesh.creation.box((0.1, 0.02, 0.02)).export(tmp_path / "square.obj")
+    words = ["--resolution", "15", "--modes", str(count), "--no-estimate"]
+    out = tmp_path / "square.h5"
+    assert main(["modes", str(tmp_path / "square.obj"), *words, "--out", str(out)]) == 0
+    assert audit(read_modes(out)).faults == []
 
 
 def test_strict_tells_a_program(folder, file, monkeypatch, capsys):

@@ -155,18 +155,22 @@ def _count_rigid(file: ModesFile, K: sp.csr_matrix) -> int:
 
 
 def gap_below_last(values: Array, gap: float = GAP, rigid: int = RIGID_MODES) -> tuple[float, int]:
-    """Middle of the last gap between ascending values that is wide, or else of the widest one.
+    """Middle of the last gap between ascending values that is wide, rigid motions being at zero.
 
-    Returns the value in the gap, and how many of the `values` are below it.
+    Returns the value in the gap, and how many of the `values` are below it. Of equal modes at the
+    end, more may come behind them: the gap is before these.
 
     Examples
     --------
     >>> gap_below_last(np.array([0.0] * 6 + [1.0, 2.0, 5.0, 5.00001]))
     (3.5, 8)
+    >>> gap_below_last(np.array([0.0] * 6 + [1.0, 1.0]))
+    (0.5, 6)
     """
-    if len(values) <= rigid + 1:
+    if len(values) <= rigid:
         return float(values[-1] * (1.0 + 1e-6)), len(values)
-    gaps = np.diff(values[rigid:]) / values[rigid + 1 :]
-    wide = np.flatnonzero(gaps > gap)
-    below = rigid + 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
-    return float(0.5 * (values[below - 1] + values[below])), below
+    elastic = values[rigid:]
+    before = np.concatenate([[0.0], elastic[:-1]])
+    wide = np.flatnonzero(elastic - before > gap * elastic)
+    last = int(wide[-1]) if len(wide) else 0
+    return float(0.5 * (before[last] + elastic[last])), rigid + last
