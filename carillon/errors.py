@@ -7,6 +7,17 @@ LONGEST_MESSAGE = 1200
 """Longest message in characters; a longer one loses its middle, so that it fits on a screen."""
 
 
+def as_text(name: str) -> str:
+    """Text whose bytes that are no text are escapes, as files and pages can hold it.
+
+    Examples
+    --------
+    >>> print(as_text("bell.obj"), as_text("\\udcff.obj"))
+    bell.obj \\udcff.obj
+    """
+    return name.encode(errors="backslashreplace").decode()
+
+
 def one_line(text: str) -> str:
     """Text fit for a terminal: one line, printable characters only, no longer than a screen.
 

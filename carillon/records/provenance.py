@@ -16,6 +16,7 @@ import h5py
 from llvmlite import binding
 
 from carillon import ROOMS, __version__
+from carillon.errors import as_text
 from carillon.processes.blas import blas_name
 from carillon.processes.threads import allowed_cores
 
@@ -107,7 +108,7 @@ def record(parameters: dict[str, Any]) -> dict[str, Any]:
 def _command() -> str:
     program = Path(sys.argv[0])
     name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
-    return shlex.join([*name.split(), *sys.argv[1:]])
+    return as_text(shlex.join([*name.split(), *sys.argv[1:]]))
 
 
 def write(file: h5py.File, parameters: dict[str, Any]) -> None:

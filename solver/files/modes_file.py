@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.errors import UserError
+from carillon.errors import UserError, as_text
 from carillon.fem.geometry import HexMesh
 from carillon.fem.geometry.walls import SIDES, WallSize
 from carillon.fem.model import RIGID_MODES, Solid
@@ -117,7 +117,8 @@ def write_modes(
         put(file, "residuals", residuals, "1", "|K x - lambda M x| / (lambda |M x|)")
         put_model(file, model)
         for key, value in attributes.items():
-            file.attrs[key] = json.dumps(value) if isinstance(value, dict) else value
+            text = json.dumps(value) if isinstance(value, dict) else value
+            file.attrs[key] = as_text(text) if isinstance(text, str) else text
         origin = measured(parameters, attributes.get("ranks", 1))
         file.create_group("provenance").attrs.update(origin)
         if more is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from carillon.builtin_names import BUILTIN_PREFIX
-from carillon.errors import UserError
+from carillon.errors import UserError, as_text
 from carillon.fem.materials import NAMES as MATERIALS
 from carillon.files.hdf5 import kind_of, open_h5
 from carillon.records import provenance
@@ -89,7 +89,7 @@ def unicode_of(value: object) -> str:
     >>> print(unicode_of("d\udcff/bell.obj"))
     d\udcff/bell.obj
     """
-    return str(value).encode(errors="backslashreplace").decode()
+    return as_text(str(value))
 
 
 def _is_file(name: str) -> bool:
