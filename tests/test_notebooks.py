@@ -6,6 +6,7 @@ import json
 import nbformat
 import notebooks
 import pytest
+from places import PLACE
 
 from tests.documentation import DOCS
 from tests.notebooks import cells
@@ -38,9 +39,11 @@ def test_a_notebook_uses_the_public_surface_alone(notebook):
 
 @EACH
 def test_a_notebook_is_a_page(notebook):
-    mark = f"<!-- made here: notebook {notebook.stem} -->\n"
-    pages = [page for page in DOCS.glob("tutorials/*.md") if page.read_text() == mark]
+    found = {page: PLACE.search(page.read_text()) for page in DOCS.glob("tutorials/*.md")}
+    places = {page: place for page, place in found.items() if place}
+    pages = [page for page in places if places[page][1] == f"notebook {notebook.stem}"]
     assert len(pages) == 1
+    assert places[pages[0]][2] == f"build/docs/tutorials/{pages[0].stem}.html"
     assert f"tutorials/{pages[0].stem}\n" in (DOCS / "index.md").read_text()
     made = notebooks.of_notebook(notebook.stem)
     assert made.startswith("# ") and all(source in made for source in cells(notebook, "code"))
