@@ -3,6 +3,7 @@
 import numpy as np
 
 from carillon.arrays import Array
+from carillon.errors import UserError, on_all_ranks
 from carillon.processes import extras
 from carillon.processes.extras import SLEPC
 from solver.assembly.system import System
@@ -54,26 +55,43 @@ def smallest_eigenpairs(
     start
         (local,) vector that the Krylov space is made from.
     method
-        `slepc` (Krylov-Schur) or `arpack`, which is SciPy's where SLEPc is not installed.
+        `slepc` (Krylov-Schur) or `arpack`, which is SciPy's where SLEPc has none, on one rank.
     configurable
         Whether PETSc's options database may overrule this set-up.
     """
     require_method(method)
     given = system, known, count, shift, start, tolerance
-    if extras.is_installed(SLEPC):
+    if _slepc_has(method):
         from solver.reference import slepc_lanczos
 
         found = slepc_lanczos.smallest_eigenpairs(*given, method, configurable)
     else:
         if system.comm.size > 1:
-            extras.require(
-                SLEPC, f"a search by ARPACK on {system.comm.size} ranks", "start one process"
-            )
+            _refuse_ranks(system.comm.size)
         from solver.reference import scipy_arpack
 
         found = scipy_arpack.smallest_eigenpairs(*given)
     values, vectors = _outside(system, known, *found[:2])
     return values[:count], vectors[:, :count], found[2]
+
+
+def _slepc_has(method: str) -> bool:
+    """Whether SLEPc is installed, and was built with a method."""
+    if not extras.is_installed(SLEPC):
+        return False
+    from carillon.processes.slepc import SLEPc
+
+    return method == KRYLOV_SCHUR or bool(SLEPc.Sys.hasExternalPackage(ARPACK))
+
+
+@on_all_ranks()
+def _refuse_ranks(ranks: int) -> None:
+    search = f"a search by ARPACK on {ranks} ranks"
+    extras.require(SLEPC, search, "start one process")
+    raise UserError(
+        f"{search} needs a SLEPc that was built with ARPACK; take --method {KRYLOV_SCHUR}, or "
+        "start one process"
+    )
 
 
 def _outside(system: System, known: Array, values: Array, vectors: Array) -> tuple[Array, Array]:
