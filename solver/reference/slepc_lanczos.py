@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from carillon.arrays import Array
-from carillon.errors import UserError, on_all_ranks
 from carillon.processes.petsc import PETSc
 from carillon.processes.slepc import SLEPc
 from solver.assembly.system import System
@@ -36,7 +35,7 @@ def smallest_eigenpairs(
 
     Krylov-Schur deflates the known vectors.  ARPACK cannot, since SLEPc lets it keep its basis
     where the deflated vectors are: it finds as many pairs more, of which those in the span of the
-    known ones are dropped. Raises UserError if this SLEPc lacks the method.
+    known ones are dropped. SLEPc has the method, which the caller has asked for.
 
     Parameters
     ----------
@@ -49,13 +48,7 @@ def smallest_eigenpairs(
         solver = SLEPc.EPS().create(system.comm)
         vectors = [_petsc_vector(start, system.comm)]
         try:
-            try:
-                solver.setType(TYPES[method])
-            except PETSc.Error:
-                with on_all_ranks():
-                    raise UserError(
-                        f"this SLEPc was built without {method}; use slepc or rebuild SLEPc with it"
-                    ) from None
+            solver.setType(TYPES[method])
             solver.setOperators(system.K, system.M)
             solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
             solver.setTolerances(tolerance, MAX_ITERATIONS)
