@@ -17,7 +17,9 @@ CAN_BE_HELD = os.open in os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
 
 
 class OpenFolder:
-    """What `os` does with a name, in a folder; links are not followed, and errors are OSError's.
+    """A folder and the operations of `os` on names in it; links are not followed.
+
+    Errors are OSError's.
 
     Parameters
     ----------
@@ -53,7 +55,7 @@ class OpenFolder:
         return os.open(where, flags | system.REGULAR, 0o666, **held)
 
     def status(self, name: str) -> os.stat_result:
-        """What `lstat` tells of a name."""
+        """Kind, size and times of a name."""
         where, held = self._find(name)
         return os.stat(where, follow_symlinks=False, **held)
 

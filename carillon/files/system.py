@@ -1,4 +1,4 @@
-"""What files need of the system where Windows has it otherwise, or not at all.
+"""Flags, locks and reads and writes at a place of files, which Windows has otherwise or lacks.
 
 On Windows a file that is open gets no other name and is not removed: its writer needs no lock
 against that, and has to close it first.
