@@ -66,7 +66,7 @@ def run_child(
 
 
 def _tied_to(parent: int) -> Callable[[], None] | None:
-    """What the child does before it becomes the program; it can neither import nor lock there.
+    """Preparation of a child before it becomes the program; it can neither import nor lock there.
 
     None on Windows, where it cannot do anything.
     """

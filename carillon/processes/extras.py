@@ -21,7 +21,7 @@ EXTRAS = {
 
 
 def install(extra: str = "cluster") -> str:
-    """What to do to get the packages of an extra, beside an installation or in a checkout."""
+    """Advice to get the packages of an extra, beside an installation or in a checkout."""
     installed = os.path.isdir(rooms.INSTALLED)
     command = f"pip install 'carillon[{extra}]'" if installed else "make env"
     return f"run `{command}` (docs/howto/environment.md)"

@@ -58,7 +58,7 @@ class Comm:
         return [value]
 
     def alltoall(self, values: Sequence[T]) -> list[T]:
-        """What each rank has for this one."""
+        """The values of all ranks for this one."""
         return list(values)
 
     def Allreduce(self, sent: AnyArray | str, received: AnyArray, op: str = SUM) -> None:  # noqa: N802

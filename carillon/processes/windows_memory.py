@@ -1,4 +1,4 @@
-"""What Windows tells of memory, in bytes."""
+"""Memory of the machine and of this process on Windows, in bytes."""
 
 import ctypes
 from typing import Any

@@ -86,7 +86,7 @@ class System:
     """Number of unknowns over all ranks."""
     comm: MPI.Comm
     layout: Layout
-    """What it has in common with other materials on its mesh."""
+    """Layout of rows and ranks, which all materials on its mesh share."""
 
     def distance_from_supports(self) -> Array | None:
         """Distance (local nodes,) from the nearest support, in half extents; None without any."""
