@@ -96,8 +96,8 @@ def _require_room(path: Path, plan: ShardPlan) -> None:
     needed = 2 * plan.settings.count * ROW.itemsize
     if needed > free:
         raise UserError(
-            f"{path}: {plan.settings.count:,} samples take {needed / 1e9:,.1f} GB while they are "
-            f"generated, {free / 1e9:,.1f} GB are free; make room, or divide them over more shards"
+            f"{path}: {plan.settings.count:,} samples take {needed / 1e6:,.1f} MB while they are "
+            f"generated, {free / 1e6:,.1f} MB are free; make room, or divide them over more shards"
         )
 
 

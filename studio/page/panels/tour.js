@@ -10,9 +10,9 @@ const STEPS = [
     place: "#view",
     title: "I want to make sounds: open a solid",
     text:
-      "Drop a mesh onto the page, choose one that comes along, or open an example. It is prepared by " +
-      "itself. Drag beside it to turn it, and press anywhere on it to strike it, as hard as the strength " +
-      "above it says.",
+      "If none is open, drop a mesh onto the page, choose one that comes along, or open an example. It is " +
+      "prepared by itself. Drag beside it to turn it, and press anywhere on it to strike it, as hard as the " +
+      "strength above it says.",
   },
   {
     place: "#panel-targets",
