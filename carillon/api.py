@@ -878,7 +878,7 @@ def render(
     at : (3,) or (p, 3)
         Points of the surface that are struck [m]; of a design in the unit of its mesh.
     target
-        Of a design: the target whose point is struck, in place of `at`.
+        Of a design: the target whose point is struck, in place of `at`; without both the only one.
     strength : float or (p,)
         Impulse along the inward normal [N s].
     times : float or (p,)

@@ -21,6 +21,7 @@ from sound.clips.noise import noise_part
 from sound.clips.wav import PEAK
 from sound.project.design_file import write_design
 from sound.rendering.clip_level import resampled
+from sound.rendering.heard_solid import heard_design
 from sound.rendering.listening import BEGIN_SECONDS, Listening
 from sound.rendering.render import Hit, render, rendered_parts, residual_share
 from sound.rendering.solid import SoundingSolid
@@ -364,6 +365,7 @@ def test_modes_too_damped_to_oscillate_are_left_out(tmp_path):
         (["--target", "side", "--out", "x.wav", "--modes-out", "x.wav"], "name another file"),
         (["--target", "side", "--damping", 1, 0], "go with modes.h5"),
         (["--target", "side", "--like", "x.h5"], "go with modes.h5"),
+        ([], r"name one of the targets \(--target\): corner, side"),
     ],
 )
 def test_mistakes_are_answered_in_one_sentence(tmp_path, words, complaint, refuses):
@@ -371,6 +373,13 @@ def test_mistakes_are_answered_in_one_sentence(tmp_path, words, complaint, refus
     command = ["render", tmp_path / "design.h5", "--out", tmp_path / "hit.wav"]
     assert re.search(complaint, refuses(main, *command, *words))
     assert [path.name for path in tmp_path.iterdir()] == ["design.h5"]
+
+
+def test_the_only_target_of_a_design_need_not_be_named():
+    heard = heard_design(small_design())
+    assert replace(heard, targets=("side",)).only_target() == "side"
+    with pytest.raises(UserError, match="no target; name a point"):
+        replace(heard, targets=()).only_target()
 
 
 def test_other_files_are_refused(tmp_path, refuses):

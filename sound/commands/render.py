@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # Their imports take long, and `--help` needs none.
     from sound.rendering.listening import Listening
     from sound.rendering.render import Hit
     from sound.rendering.rendered_sound import RenderedSound
+    from sound.rendering.strike_list import Point as StruckPoint
 
 TOLD = 1e-3
 """Least share of the clips' energy in missed tones that is reported."""
@@ -38,9 +39,13 @@ _Impulse = Annotated[float, between(-LARGEST_IMPULSE, LARGEST_IMPULSE)]
 
 @parameters
 class PointOptions:
-    """Where a solid is struck, by one of the four."""
+    """Where a solid is struck, by one of the four; a design of one target is struck there."""
 
-    target: str | None = option(None, "strike where a target was assigned", metavar="NAME")
+    target: str | None = option(
+        None,
+        "strike where a target was assigned (default: the only one of a design)",
+        metavar="NAME",
+    )
     vertex: Number | None = option(None, "strike a vertex of the surface")
     at: Point | None = option(
         None,
@@ -121,7 +126,7 @@ class ScaleOptions:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line."""
-    add_options(parser.add_mutually_exclusive_group(required=True), PointOptions)
+    add_options(parser.add_mutually_exclusive_group(), PointOptions)
     add_options(parser.add_mutually_exclusive_group(), ImpulseOptions)
     add_options(parser, RenderOptions, positional=("file",))
     add_options(parser.add_mutually_exclusive_group(), ScaleOptions)
@@ -181,16 +186,13 @@ def _hits(heard: HeardSolid, points: PointOptions, strike: ImpulseOptions) -> li
     import numpy as np
 
     from sound.rendering.render import Hit
-    from sound.rendering.strike_list import Point, read_strikes
+    from sound.rendering.strike_list import read_strikes
 
     if points.strikes is not None:
         if strike.impulse is not None:
             raise UserError("--impulse goes with one strike; give strengths in the list")
         return heard.hits(points.strikes, read_strikes(points.strikes), strike.strength)
-    given = next(name for name in ("target", "vertex", "at") if getattr(points, name) is not None)
-    at = None if points.at is None else (points.at[0], points.at[1], points.at[2])
-    point = Point(points.target, points.vertex, at)
-    ((position, inward, distance),) = heard.places([(f"--{given}", point)])
+    ((position, inward, distance),) = heard.places([_point(heard, points)])
     if strike.impulse is None:
         return [Hit(0.0, position, strike.strength * inward, distance)]
     impulse = np.array(strike.impulse)
@@ -201,6 +203,17 @@ def _hits(heard: HeardSolid, points: PointOptions, strike: ImpulseOptions) -> li
             f"{strength:g} N s in all is less than {LEAST_IMPULSE:g}"
         )
     return [Hit(0.0, position, impulse, distance)]
+
+
+def _point(heard: HeardSolid, points: PointOptions) -> tuple[str, StruckPoint]:
+    """The point that is struck once, and the option that names it."""
+    from sound.rendering.strike_list import Point as StruckPoint
+
+    if points.at is not None:
+        return "--at", StruckPoint(None, None, (points.at[0], points.at[1], points.at[2]))
+    if points.vertex is not None:
+        return "--vertex", StruckPoint(None, points.vertex, None)
+    return "--target", StruckPoint(heard.only_target() if points.target is None else points.target)
 
 
 def _summary(

@@ -26,14 +26,29 @@ Places = Callable[[Iterable[tuple[str, Point]]], list[tuple[Array, Array, float]
 class HeardSolid:
     """A solid with its loudness and its surface.
 
-    `listening` has loudness and noise of a design's clips, and is None for modes of no design.
-    `places` leads from points of the surface, each with its name in messages, to positions (3,)
-    [m], inward normals (3,) and distances [m] from the points named.
+    `listening` has loudness and noise of a design's clips, and is None for modes of no design;
+    `targets` are the names of the design's targets. `places` leads from points of the surface,
+    each with its name in messages, to positions (3,) [m], inward normals (3,) and distances [m]
+    from the points named.
     """
 
     solid: SoundingSolid
     listening: Listening | None
+    targets: tuple[str, ...]
     places: Places
+
+    def only_target(self) -> str:
+        """The target of a design that has one; raises UserError if there is none, or a choice."""
+        if not self.targets:
+            raise UserError(
+                "where is the solid struck? modes of no design have no target; name a point (--at)"
+            )
+        if len(self.targets) > 1:
+            names = ", ".join(self.targets)
+            raise UserError(
+                f"where is the solid struck? name one of the targets (--target): {names}"
+            )
+        return self.targets[0]
 
     def hits(self, path: str | Path, strikes: Sequence[ListedStrike], strength: float) -> list[Hit]:
         """The strikes of a list, read from `path`; `strength` [N s] is that of lines without one.
@@ -84,7 +99,9 @@ def heard_modes(file: ModesFile, damping: Sequence[float] | None = None) -> Hear
     """The solid of any modes file, with Rayleigh damping: that given, its regions', or the
     default."""
     rayleigh = None if damping is None else Damping(*damping)
-    return HeardSolid(SoundingSolid.of_modes(file, rayleigh), None, _places_of_model(file.model))
+    return HeardSolid(
+        SoundingSolid.of_modes(file, rayleigh), None, (), _places_of_model(file.model)
+    )
 
 
 def heard_design(design: Design, truth: ModesFile | None = None) -> HeardSolid:
@@ -93,7 +110,8 @@ def heard_design(design: Design, truth: ModesFile | None = None) -> HeardSolid:
         solid = SoundingSolid.of_design(design)
     else:
         solid = SoundingSolid.of_truth(truth, design)
-    return HeardSolid(solid, Listening.of_design(design, solid), _places_of_design(design))
+    names = tuple(strike.name for strike in design.strikes)
+    return HeardSolid(solid, Listening.of_design(design, solid), names, _places_of_design(design))
 
 
 def _places_of_design(design: Design) -> Places:

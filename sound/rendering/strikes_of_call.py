@@ -34,7 +34,7 @@ class StrikesOfCall:
     damping: RayleighDamping | None = option(REQUIRED)
 
     def __post_init__(self) -> None:
-        if (self.at is None) == (self.target is None):
+        if self.at is not None and self.target is not None:
             raise ValueError("expected at, the points that are struck, or target, the name of one")
         count = len(self.at or [self.target])
         for name in ("strength", "times"):
@@ -45,10 +45,12 @@ class StrikesOfCall:
     def hits(self, heard: HeardSolid) -> list[Hit]:
         """The strikes of a solid.
 
-        Raises UserError if it has no such target, or a point is far from its surface.
+        Raises UserError if it has no such target, or several and none is named, or a point is far
+        from its surface.
         """
         if self.at is None:
-            points = [("target", StruckPoint(target=self.target))]
+            target = heard.only_target() if self.target is None else self.target
+            points = [("target", StruckPoint(target=target))]
         else:
             points = [("at", StruckPoint(at=each)) for each in self.at]
         count = len(points)
